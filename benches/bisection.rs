@@ -1,8 +1,7 @@
-//! One cut, stage by stage: resident, with a pool smaller than the mesh, and with parts of the method switched off.
+//! One cut, stage by stage: resident, and with a pool smaller than the mesh.
 //!
-//! `cargo bench --bench bisection -- [sample] [method|pool|balance]`; without arguments a smoke size and all of them. `method` compares what each
-//! step of choosing the interface brings, `pool` runs with frames for a twentieth of the finished mesh, `balance [least length] [n]…` makes whole meshes of
-//! a box whose sizes are graded 20:1 in so many sub-domains, planes placed by load and by volume.
+//! `cargo bench --bench bisection -- [sample] [pool|balance]`; without arguments a smoke size and both of them. `pool` runs with frames for a
+//! twentieth of the finished mesh, `balance [least length] [n]…` makes whole meshes of a box whose sizes are graded 20:1 in so many sub-domains.
 //! Wall seconds of one thread; the coarse mesh is not counted.
 
 use std::time::Instant;
@@ -10,8 +9,8 @@ use std::time::Instant;
 use tetdb_base::geom::{Point, mix};
 use tetdb_base::storage::{Backing, Budget, Pager, ScratchSpace, attempt};
 use tetdb_base::surface::Surface;
-use tetdb_engine::pipeline::{self, Options, OptionsText, RunOptions, silent};
-use tetdb_kernel::bisect::{self, CutPlan, CutReport, Method, PlaneChoice, Steps, load_of};
+use tetdb_engine::pipeline::{self, MeshOptions, Options, OptionsText, silent};
+use tetdb_kernel::bisect::{self, CutPlan, CutReport, Method, load_of};
 use tetdb_kernel::mesh::{Mesh, Workspace, renumber};
 use tetdb_kernel::optimize::{Mode, Settings};
 use tetdb_kernel::samples::SampleSpec;
@@ -58,7 +57,7 @@ impl Bench {
             subdomain: 0,
             generation: 1,
             spill: self.dir.path().into(),
-            made: made.map(|name| self.dir.path().join(name).into()),
+            output: made.map(|name| self.dir.path().join(name).into()),
             base: None,
             cache_bytes: 16 << 20,
         };
@@ -175,38 +174,32 @@ fn balance(least: f64, n: u32) {
         .and_then(|spec| spec.make())
         .expect("a sample")
         .into();
-    for (name, plane) in [("load", PlaneChoice::Load), ("volume", PlaneChoice::Volume)] {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let mut catalog =
-            Catalog::create(dir.path().join("b.tetdb"), &Job::default()).expect("an empty place");
-        let text = OptionsText {
-            size_expr: Some(format!("min({coarse}, {least} + 0.26 * x)")),
-            subdomains: Some(n.to_string()),
-            optimize: Some("none".to_owned()),
-            ..OptionsText::default()
-        };
-        let method = Method { plane, ..Method::default() };
-        let options = Options {
-            mesh: text.try_into().expect("good options"),
-            run: RunOptions { method, ..RunOptions::default() },
-        };
-        let budget = Budget::new(4 << 30);
-        pipeline::mesh(&mut catalog, &surface, &options, &budget, &silent).expect("a mesh");
-        let tets = catalog.subdomains().expect("rows").into_iter();
-        let tets: Vec<f64> = tets.map(|row| row.tets as f64).collect();
-        let journal = catalog.journal().expect("rows");
-        let told = journal.iter().flat_map(|row| &row.measures);
-        let told: Vec<f64> = told.filter(|m| m.name == "predicted_tets").map(|m| m.value).collect();
-        // The first is that of the whole.
-        let predicted = &told[told.len() - tets.len()..];
-        println!(
-            "balance by {name:<7} {} sub-domains, {} tetrahedra: most over mean of what was shared {:.3}, of tetrahedra {:.3}",
-            tets.len(),
-            tets.iter().sum::<f64>(),
-            most_over_mean(predicted),
-            most_over_mean(&tets),
-        );
-    }
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let mut catalog =
+        Catalog::create(dir.path().join("b.tetdb"), &Job::default()).expect("an empty place");
+    let text = OptionsText {
+        size_expr: Some(format!("min({coarse}, {least} + 0.26 * x)")),
+        subdomains: Some(n.to_string()),
+        optimize: Some("none".to_owned()),
+        ..OptionsText::default()
+    };
+    let options = Options::from(MeshOptions::try_from(text).expect("good options"));
+    let budget = Budget::new(4 << 30);
+    pipeline::mesh(&mut catalog, &surface, &options, &budget, &silent).expect("a mesh");
+    let tets = catalog.subdomains().expect("rows").into_iter();
+    let tets: Vec<f64> = tets.map(|row| row.tets as f64).collect();
+    let journal = catalog.journal().expect("rows");
+    let told = journal.iter().flat_map(|row| &row.measures);
+    let told: Vec<f64> = told.filter(|m| m.name == "predicted_tets").map(|m| m.value).collect();
+    // The first is that of the whole.
+    let predicted = &told[told.len() - tets.len()..];
+    println!(
+        "balance: {} sub-domains, {} tetrahedra: most over mean of what was shared {:.3}, of tetrahedra {:.3}",
+        tets.len(),
+        tets.iter().sum::<f64>(),
+        most_over_mean(predicted),
+        most_over_mean(&tets),
+    );
 }
 
 fn most_over_mean(numbers: &[f64]) -> f64 {
@@ -224,20 +217,6 @@ fn main() {
     let whole = bench.cut(Method::default(), plenty);
     println!("{sample}: {} triangles", bench.surface.n_triangles());
     tell("as it is", &whole);
-    let steps = |minimum_cut, vertex_moves, tet_moves| Method {
-        steps: Steps { minimum_cut, vertex_moves, tet_moves },
-        ..Method::default()
-    };
-    if asked("method") {
-        for (name, method) in [
-            ("minimum cut alone", steps(true, false, false)),
-            ("moves of vertices", steps(false, true, false)),
-            ("moves of tetrahedra", steps(false, false, true)),
-            ("both moves", steps(false, true, true)),
-        ] {
-            tell(name, &bench.cut(method, plenty));
-        }
-    }
     if asked("balance") {
         let least = words.next().map_or(0.02, |w| w.parse().expect("a length"));
         let mut counts: Vec<u32> = words.map(|w| w.parse().expect("a number")).collect();

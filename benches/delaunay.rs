@@ -52,7 +52,7 @@ fn main() {
                     subdomain: 0,
                     generation: 1,
                     spill: dir.path().into(),
-                    made: None,
+                    output: None,
                     base: None,
                     cache_bytes: 16 << 20,
                 };

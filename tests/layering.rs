@@ -55,7 +55,7 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "chains, faces and suppression of one attempt, which hand on four lists",
     ),
     (
-        "kernel/boundary/space.rs replace",
+        "kernel/boundary/complex.rs replace",
         "pairs of sides are matched; each step uses the list before",
     ),
     ("cli/estimate.rs run", "an answer line by line, for people and for programs"),

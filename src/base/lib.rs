@@ -1,4 +1,4 @@
-//! What everything else stands on: geometry, the language of sizes and queries, paged storage, surfaces.
+//! The base of all other crates: geometry, the language of sizes and queries, paged storage, surfaces.
 //!
 //! | module | subject |
 //! |---|---|
@@ -8,7 +8,7 @@
 //! | [`storage`] | pages, cache, budget, transactions, external sort |
 //! | [`surface`] | triangles, labels, validation |
 //!
-//! This crate knows no mesh of tetrahedra. Programs use the crate `tetdb`; no promise is made of what is public here.
+//! This crate has no mesh of tetrahedra. Programs use the crate `tetdb`; the items here may change at any time.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 

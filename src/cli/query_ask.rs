@@ -2,7 +2,7 @@
 
 use super::args::QueryArgs;
 use super::failure::Failure;
-use tetdb_base::expr::{ExprError, Expression, Kind};
+use tetdb_base::expr::{ExprError, ExprKind, Expression};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_schema::code::Code;
 use tetdb_store::query::{QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called};
@@ -155,7 +155,7 @@ fn solids(args: &QueryArgs) -> Result<Vec<Solid>, Failure> {
 pub fn condition(text: &str) -> Result<Expression, Failure> {
     let condition =
         Expression::parse(text, &VARIABLES).map_err(|error| bad_expression(text, &error))?;
-    if condition.kind() == Kind::Truth {
+    if condition.kind() == ExprKind::Truth {
         return Ok(condition);
     }
     let error = ExprError {

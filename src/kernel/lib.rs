@@ -13,8 +13,8 @@
 //! | [`bisect`] | one cut: plane, zone, interface, two children |
 //! | [`topology`] | which sub-domains are neighbors |
 //!
-//! This crate knows neither a store nor a file format. Programs use the crate `tetdb`; no promise is made of what is
-//! public here.
+//! This crate has no access to a store or to file formats. Programs use the crate `tetdb`; the items here may change at
+//! any time.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 

@@ -13,7 +13,7 @@ use tetdb_base::surface::{Surface, orient_alike, validate};
 use tetdb_engine::pipeline::{self, MeshOptions, Options, OptionsText, PipelineError};
 use tetdb_kernel::boundary::{BoundaryError, RecoveryReport, RegionPolicy, fill_regions, recover};
 use tetdb_kernel::delaunay::{Kernel, enclose, insertion_key};
-use tetdb_kernel::mesh::{FaceRef, Facet, Mesh, VertexTag};
+use tetdb_kernel::mesh::{FaceRef, Mesh, MeshFacet, VertexTag};
 use tetdb_schema::catalog::Job;
 use tetdb_store::audit::{self, Level, VerifyOptions};
 use tetdb_store::store::Catalog;
@@ -173,7 +173,7 @@ pub fn delaunay(surface: &Surface) -> Mesh<FlatPages> {
         id[i as usize] = v;
     }
     for (n, t) in surface.triangles.iter().enumerate() {
-        mesh.add_facet(Facet {
+        mesh.add_facet(MeshFacet {
             vertices: t.map(|i| id[i as usize]),
             label: 0,
             input: n as u64,

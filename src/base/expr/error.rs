@@ -1,4 +1,4 @@
-//! What is wrong with a text.
+//! Errors of expressions.
 
 /// A text that is no expression.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -6,6 +6,6 @@
 pub struct ExprError {
     /// Byte of the text where the fault was found; its length when something is missing at the end.
     pub at: usize,
-    /// What is wrong, as a sentence.
+    /// The error, as a sentence.
     pub message: String,
 }

@@ -1,11 +1,11 @@
-//! A parsed expression and what can be asked of it.
+//! A parsed expression and its evaluation.
 
 use super::op::{Op, STACK_MAX};
 use super::{machine, ranges};
 
-/// What an expression is: a number or a truth.
+/// Type of an expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ExprKind {
     /// A number.
     Number,
     /// True or false.
@@ -19,7 +19,7 @@ pub enum Kind {
 pub struct Expression {
     pub(super) ops: Vec<Op>,
     pub(super) lists: Vec<Vec<f64>>,
-    pub(super) kind: Kind,
+    pub(super) kind: ExprKind,
 }
 
 impl Expression {
@@ -28,12 +28,12 @@ impl Expression {
     /// Most values waiting for their operation, and most brackets and signs within each other.
     pub const STACK_MAX: usize = STACK_MAX;
 
-    /// What it is.
-    pub fn kind(&self) -> Kind {
+    /// Type of the expression.
+    pub fn kind(&self) -> ExprKind {
         self.kind
     }
 
-    /// Whether it names the variable at a position.
+    /// Returns whether it names the variable at a position.
     pub fn names(&self, variable: usize) -> bool {
         (self.ops.iter()).any(|op| matches!(op, Op::Variable(v) if *v == variable))
     }
@@ -42,7 +42,7 @@ impl Expression {
     ///
     /// Panics when it is a truth, or with fewer values than variables.
     pub fn number(&self, values: &[f64]) -> f64 {
-        assert_eq!(self.kind, Kind::Number, "a truth is no number");
+        assert_eq!(self.kind, ExprKind::Number, "a truth is no number");
         machine::run(&self.ops, &self.lists, values)
     }
 
@@ -50,15 +50,15 @@ impl Expression {
     ///
     /// Panics when it is a number, or with fewer values than variables.
     pub fn truth(&self, values: &[f64]) -> bool {
-        assert_eq!(self.kind, Kind::Truth, "a number is no truth");
+        assert_eq!(self.kind, ExprKind::Truth, "a number is no truth");
         machine::run(&self.ops, &self.lists, values) != 0.0
     }
 
-    /// Whether it, a truth, can hold when each variable lies somewhere in its closed range.
+    /// Returns whether it, a truth, can hold when each variable lies somewhere in its closed range.
     ///
     /// False is certain, true is not. Panics as [`Expression::truth`].
     pub fn may_hold(&self, ranges: &[[f64; 2]]) -> bool {
-        assert_eq!(self.kind, Kind::Truth, "a number is no truth");
+        assert_eq!(self.kind, ExprKind::Truth, "a number is no truth");
         ranges::may_hold(&self.ops, &self.lists, ranges)
     }
 }

@@ -1,9 +1,9 @@
-//! What operations do: postfix on a short stack of numbers. A truth is 1 or 0.
+//! Evaluation: operations in postfix on a short stack of numbers. A truth is 1 or 0.
 
-use super::op::{Binary, Op, STACK_MAX, Unary};
+use super::op::{BinaryOp, Op, STACK_MAX, Unary};
 
 impl Unary {
-    pub(super) fn of(self, x: f64) -> f64 {
+    pub(super) fn apply(self, x: f64) -> f64 {
         match self {
             Self::Abs => x.abs(),
             Self::Ceil => x.ceil(),
@@ -23,8 +23,8 @@ impl Unary {
     }
 }
 
-impl Binary {
-    pub(super) fn of(self, a: f64, b: f64) -> f64 {
+impl BinaryOp {
+    pub(super) fn apply(self, a: f64, b: f64) -> f64 {
         match self {
             Self::Add => a + b,
             Self::And => truth(a != 0.0 && b != 0.0),
@@ -65,10 +65,10 @@ pub(super) fn run(ops: &[Op], lists: &[Vec<f64>], values: &[f64]) -> f64 {
                 stack[n] = values[v];
                 n += 1;
             }
-            Op::Unary(f) => stack[n - 1] = f.of(stack[n - 1]),
-            Op::Binary(f) => {
+            Op::Unary(f) => stack[n - 1] = f.apply(stack[n - 1]),
+            Op::BinaryOp(f) => {
                 n -= 1;
-                stack[n - 1] = f.of(stack[n - 1], stack[n]);
+                stack[n - 1] = f.apply(stack[n - 1], stack[n]);
             }
             Op::In(list) => stack[n - 1] = truth(lists[list].contains(&stack[n - 1])),
             Op::If => {

@@ -1,4 +1,4 @@
-//! The small typed expression language of sizes and queries. This module knows no mesh.
+//! The small typed expression language of sizes and queries. It has no access to a mesh.
 //!
 //! | what | how |
 //! |---|---|
@@ -8,13 +8,13 @@
 //! | truths | `true`, `false`, `not`, then `and`, then `or` |
 //! | functions | `abs ceil cos exp floor log` (natural) `max min pow round sign sin sqrt tan`, `if(truth, number, number)` |
 //!
-//! Both sides of everything are evaluated; nothing has an effect. Numbers are doubles: `1/0` is infinite, `0/0` and
-//! `sqrt(-1)` are not numbers (NaN). What is computed from NaN is NaN, `min` and `max` too; every
-//! comparison with it is false, only `!=` is true. `round` takes halves away from zero, `sign(0) = 0`.
-//! Functions come from basic operations alone, so that a value has the same bits on every machine.
+//! Both sides of every operation are evaluated; none has an effect. Numbers are doubles: `1/0` is infinite, `0/0` and
+//! `sqrt(-1)` are not numbers (NaN). Operations on NaN give NaN, `min` and `max` too. Every comparison with NaN is
+//! false; only `!=` is true. `round` takes halves away from zero, `sign(0) = 0`. Functions use basic operations alone,
+//! so that a value has the same bits on every machine.
 //!
-//! Reading order: `words` (text to words), `parser` (words to operations), `machine` (what an operation does), `ranges`
-//! (what can come out when variables lie within ranges).
+//! Reading order: `words` (text to tokens), `parser` (tokens to operations), `machine` (evaluation), `ranges`
+//! (evaluation over intervals of the variables).
 
 mod error;
 mod expression;
@@ -27,4 +27,4 @@ mod tests;
 mod words;
 
 pub use error::ExprError;
-pub use expression::{Expression, Kind};
+pub use expression::{ExprKind, Expression};

@@ -23,7 +23,7 @@ pub(super) enum Unary {
 
 /// A function of two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Binary {
+pub(super) enum BinaryOp {
     Add,
     And,
     Divide,
@@ -48,8 +48,8 @@ pub(super) enum Op {
     /// The value at a position.
     Variable(usize),
     Unary(Unary),
-    Binary(Binary),
-    /// Whether the value is in the list of this number.
+    BinaryOp(BinaryOp),
+    /// True if the value is in the list of this number.
     In(usize),
     /// Truth, number, number: the first of the numbers where the truth holds.
     If,

@@ -1,10 +1,10 @@
-//! Words to operations: precedence climbing, kinds checked on the way.
+//! Parses tokens to operations by precedence climbing, and checks their types.
 
-use super::op::{Binary, Op, Unary};
-use super::words::{Word, fault, next_word};
-use super::{ExprError, Expression, Kind};
+use super::op::{BinaryOp, Op, Unary};
+use super::words::{Token, fault, next_word};
+use super::{ExprError, ExprKind, Expression};
 
-/// How tightly operators bind, from the loosest.
+/// Binding strength of operators, from the loosest.
 const OR: u8 = 1;
 const AND: u8 = 2;
 const COMPARISON: u8 = 4;
@@ -16,42 +16,42 @@ const POWER: u8 = 7;
 struct Infix {
     binds: u8,
     /// The kind of its operands.
-    takes: Kind,
-    gives: Kind,
-    op: Binary,
+    takes: ExprKind,
+    gives: ExprKind,
+    op: BinaryOp,
 }
 
-fn infix(word: Word) -> Option<Infix> {
+fn infix(word: Token) -> Option<Infix> {
     let (binds, op) = match word {
-        Word::Name("or") => (OR, Binary::Or),
-        Word::Name("and") => (AND, Binary::And),
-        Word::Sign("=" | "==") => (COMPARISON, Binary::Equal),
-        Word::Sign("!=") => (COMPARISON, Binary::NotEqual),
-        Word::Sign("<") => (COMPARISON, Binary::Less),
-        Word::Sign("<=") => (COMPARISON, Binary::LessEqual),
-        Word::Sign(">") => (COMPARISON, Binary::Greater),
-        Word::Sign(">=") => (COMPARISON, Binary::GreaterEqual),
-        Word::Sign("+") => (SUM, Binary::Add),
-        Word::Sign("-") => (SUM, Binary::Subtract),
-        Word::Sign("*") => (PRODUCT, Binary::Multiply),
-        Word::Sign("/") => (PRODUCT, Binary::Divide),
-        Word::Sign("^") => (POWER, Binary::Power),
+        Token::Name("or") => (OR, BinaryOp::Or),
+        Token::Name("and") => (AND, BinaryOp::And),
+        Token::Sign("=" | "==") => (COMPARISON, BinaryOp::Equal),
+        Token::Sign("!=") => (COMPARISON, BinaryOp::NotEqual),
+        Token::Sign("<") => (COMPARISON, BinaryOp::Less),
+        Token::Sign("<=") => (COMPARISON, BinaryOp::LessEqual),
+        Token::Sign(">") => (COMPARISON, BinaryOp::Greater),
+        Token::Sign(">=") => (COMPARISON, BinaryOp::GreaterEqual),
+        Token::Sign("+") => (SUM, BinaryOp::Add),
+        Token::Sign("-") => (SUM, BinaryOp::Subtract),
+        Token::Sign("*") => (PRODUCT, BinaryOp::Multiply),
+        Token::Sign("/") => (PRODUCT, BinaryOp::Divide),
+        Token::Sign("^") => (POWER, BinaryOp::Power),
         _ => return None,
     };
     let (takes, gives) = match binds {
-        OR | AND => (Kind::Truth, Kind::Truth),
-        COMPARISON => (Kind::Number, Kind::Truth),
-        _ => (Kind::Number, Kind::Number),
+        OR | AND => (ExprKind::Truth, ExprKind::Truth),
+        COMPARISON => (ExprKind::Number, ExprKind::Truth),
+        _ => (ExprKind::Number, ExprKind::Number),
     };
     Some(Infix { binds, takes, gives, op })
 }
 
-/// What a name in front of a bracket does.
+/// The meaning of a name in front of a bracket.
 enum Function {
     One(Unary),
-    Two(Binary),
+    Two(BinaryOp),
     /// Two or more.
-    Many(Binary),
+    Many(BinaryOp),
     If,
 }
 
@@ -67,9 +67,9 @@ fn function(name: &str) -> Option<Function> {
         "floor" => Function::One(Unary::Floor),
         "if" => Function::If,
         "log" => Function::One(Unary::Log),
-        "max" => Function::Many(Binary::Max),
-        "min" => Function::Many(Binary::Min),
-        "pow" => Function::Two(Binary::Power),
+        "max" => Function::Many(BinaryOp::Max),
+        "min" => Function::Many(BinaryOp::Min),
+        "pow" => Function::Two(BinaryOp::Power),
         "round" => Function::One(Unary::Round),
         "sign" => Function::One(Unary::Sign),
         "sin" => Function::One(Unary::Sin),
@@ -82,8 +82,8 @@ fn function(name: &str) -> Option<Function> {
 struct Parser<'a> {
     text: &'a str,
     variables: &'a [&'a str],
-    /// The word to be looked at, where it begins and ends.
-    word: Word<'a>,
+    /// The current token, its begin and its end.
+    word: Token<'a>,
     start: usize,
     end: usize,
     ops: Vec<Op>,
@@ -112,7 +112,7 @@ fn parse(text: &str, variables: &[&str]) -> Result<Expression, ExprError> {
     let mut parser = Parser {
         text,
         variables,
-        word: Word::End,
+        word: Token::End,
         start: 0,
         end: 0,
         ops: Vec::new(),
@@ -122,7 +122,7 @@ fn parse(text: &str, variables: &[&str]) -> Result<Expression, ExprError> {
     };
     parser.advance()?;
     let kind = parser.expression(OR)?;
-    if parser.word != Word::End {
+    if parser.word != Token::End {
         let what = parser.found();
         return Err(fault(parser.start, format!("expected an operator or the end, found {what}")));
     }
@@ -138,13 +138,13 @@ impl<'a> Parser<'a> {
     /// The word at hand as a message names it.
     fn found(&self) -> String {
         match self.word {
-            Word::End => "the end".to_owned(),
+            Token::End => "the end".to_owned(),
             _ => format!("`{}`", &self.text[self.start..self.end]),
         }
     }
 
     fn expect(&mut self, sign: &'static str) -> Result<(), ExprError> {
-        if self.word != Word::Sign(sign) {
+        if self.word != Token::Sign(sign) {
             let found = self.found();
             return Err(fault(self.start, format!("expected `{sign}`, found {found}")));
         }
@@ -155,7 +155,7 @@ impl<'a> Parser<'a> {
         match op {
             Op::Constant(_) | Op::Variable(_) => self.waiting += 1,
             Op::Unary(_) | Op::In(_) => {}
-            Op::Binary(_) => self.waiting -= 1,
+            Op::BinaryOp(_) => self.waiting -= 1,
             Op::If => self.waiting -= 2,
         }
         if self.waiting > Expression::STACK_MAX {
@@ -170,7 +170,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Operators that bind at least as tightly as `least`, and their operands.
-    fn expression(&mut self, least: u8) -> Result<Kind, ExprError> {
+    fn expression(&mut self, least: u8) -> Result<ExprKind, ExprError> {
         self.depth += 1;
         if self.depth > Expression::STACK_MAX {
             return Err(self.too_deep());
@@ -179,9 +179,9 @@ impl<'a> Parser<'a> {
         let mut kind = self.operand()?;
         let mut compared = false;
         loop {
-            if self.word == Word::Name("in") && least <= COMPARISON {
+            if self.word == Token::Name("in") && least <= COMPARISON {
                 self.not_chained(compared)?;
-                check(kind, Kind::Number, start, "in")?;
+                check(kind, ExprKind::Number, start, "in")?;
                 kind = self.list()?;
                 compared = true;
                 continue;
@@ -200,7 +200,7 @@ impl<'a> Parser<'a> {
             let binds = operator.binds + u8::from(operator.binds != POWER);
             let other = self.expression(binds)?;
             check(other, operator.takes, right, name)?;
-            self.push(Op::Binary(operator.op))?;
+            self.push(Op::BinaryOp(operator.op))?;
             kind = operator.gives;
             compared = operator.binds == COMPARISON;
         }
@@ -215,23 +215,23 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn operand(&mut self) -> Result<Kind, ExprError> {
+    fn operand(&mut self) -> Result<ExprKind, ExprError> {
         let (word, start) = (self.word, self.start);
         match word {
-            Word::Number(value) => {
+            Token::Number(value) => {
                 self.advance()?;
                 self.push(Op::Constant(value))?;
-                Ok(Kind::Number)
+                Ok(ExprKind::Number)
             }
-            Word::Sign("(") => {
+            Token::Sign("(") => {
                 self.advance()?;
                 let kind = self.expression(OR)?;
                 self.expect(")")?;
                 Ok(kind)
             }
-            Word::Sign("-") => self.prefix(Unary::Negate, POWER, Kind::Number),
-            Word::Name("not") => self.prefix(Unary::Not, COMPARISON, Kind::Truth),
-            Word::Name(name) if !matches!(name, "and" | "or" | "in") => self.name(name),
+            Token::Sign("-") => self.prefix(Unary::Negate, POWER, ExprKind::Number),
+            Token::Name("not") => self.prefix(Unary::Not, COMPARISON, ExprKind::Truth),
+            Token::Name(name) if !matches!(name, "and" | "or" | "in") => self.name(name),
             _ => {
                 let found = self.found();
                 Err(fault(start, format!("expected a number, a name or `(`, found {found}")))
@@ -239,7 +239,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn prefix(&mut self, op: Unary, binds: u8, kind: Kind) -> Result<Kind, ExprError> {
+    fn prefix(&mut self, op: Unary, binds: u8, kind: ExprKind) -> Result<ExprKind, ExprError> {
         let name = &self.text[self.start..self.end];
         self.advance()?;
         let start = self.start;
@@ -249,17 +249,17 @@ impl<'a> Parser<'a> {
         Ok(kind)
     }
 
-    fn name(&mut self, name: &str) -> Result<Kind, ExprError> {
+    fn name(&mut self, name: &str) -> Result<ExprKind, ExprError> {
         let start = self.start;
         self.advance()?;
         if let Some(v) = self.variables.iter().position(|known| *known == name) {
             self.push(Op::Variable(v))?;
-            return Ok(Kind::Number);
+            return Ok(ExprKind::Number);
         }
         let (value, kind) = match name {
-            "pi" => (std::f64::consts::PI, Kind::Number),
-            "true" => (1.0, Kind::Truth),
-            "false" => (0.0, Kind::Truth),
+            "pi" => (std::f64::consts::PI, ExprKind::Number),
+            "true" => (1.0, ExprKind::Truth),
+            "false" => (0.0, ExprKind::Truth),
             _ => {
                 return match function(name) {
                     Some(function) => self.call(name, &function),
@@ -272,7 +272,7 @@ impl<'a> Parser<'a> {
     }
 
     fn unknown(&self, name: &str, start: usize) -> ExprError {
-        let message = if self.word == Word::Sign("(") {
+        let message = if self.word == Token::Sign("(") {
             format!("there is no function `{name}`; there are {FUNCTIONS}")
         } else if self.variables.is_empty() {
             format!("there is no variable `{name}`")
@@ -283,66 +283,66 @@ impl<'a> Parser<'a> {
         fault(start, message)
     }
 
-    fn call(&mut self, name: &str, function: &Function) -> Result<Kind, ExprError> {
+    fn call(&mut self, name: &str, function: &Function) -> Result<ExprKind, ExprError> {
         self.expect("(")?;
         match function {
             Function::One(op) => {
-                self.argument(name, Kind::Number)?;
+                self.argument(name, ExprKind::Number)?;
                 self.push(Op::Unary(*op))?;
             }
             Function::Two(op) => {
-                self.argument(name, Kind::Number)?;
+                self.argument(name, ExprKind::Number)?;
                 self.expect(",")?;
-                self.argument(name, Kind::Number)?;
-                self.push(Op::Binary(*op))?;
+                self.argument(name, ExprKind::Number)?;
+                self.push(Op::BinaryOp(*op))?;
             }
             Function::Many(op) => {
-                self.argument(name, Kind::Number)?;
+                self.argument(name, ExprKind::Number)?;
                 loop {
                     self.expect(",")?;
-                    self.argument(name, Kind::Number)?;
-                    self.push(Op::Binary(*op))?;
-                    if self.word == Word::Sign(")") {
+                    self.argument(name, ExprKind::Number)?;
+                    self.push(Op::BinaryOp(*op))?;
+                    if self.word == Token::Sign(")") {
                         break;
                     }
                 }
             }
             Function::If => {
-                self.argument(name, Kind::Truth)?;
+                self.argument(name, ExprKind::Truth)?;
                 for _ in 0..2 {
                     self.expect(",")?;
-                    self.argument(name, Kind::Number)?;
+                    self.argument(name, ExprKind::Number)?;
                 }
                 self.push(Op::If)?;
             }
         }
         self.expect(")")?;
-        Ok(Kind::Number)
+        Ok(ExprKind::Number)
     }
 
-    fn argument(&mut self, name: &str, kind: Kind) -> Result<(), ExprError> {
+    fn argument(&mut self, name: &str, kind: ExprKind) -> Result<(), ExprError> {
         let start = self.start;
         let found = self.expression(OR)?;
         check(found, kind, start, name)
     }
 
     /// `in [number, ..]`.
-    fn list(&mut self) -> Result<Kind, ExprError> {
+    fn list(&mut self) -> Result<ExprKind, ExprError> {
         self.advance()?;
         self.expect("[")?;
         let mut list = Vec::new();
         loop {
-            let negative = self.word == Word::Sign("-");
+            let negative = self.word == Token::Sign("-");
             if negative {
                 self.advance()?;
             }
-            let Word::Number(value) = self.word else {
+            let Token::Number(value) = self.word else {
                 let found = self.found();
                 return Err(fault(self.start, format!("a list holds numbers, found {found}")));
             };
             list.push(if negative { -value } else { value });
             self.advance()?;
-            if self.word != Word::Sign(",") {
+            if self.word != Token::Sign(",") {
                 break;
             }
             self.advance()?;
@@ -350,18 +350,18 @@ impl<'a> Parser<'a> {
         self.expect("]")?;
         self.push(Op::In(self.lists.len()))?;
         self.lists.push(list);
-        Ok(Kind::Truth)
+        Ok(ExprKind::Truth)
     }
 }
 
 /// An operand of another kind than its operator takes is a fault.
-fn check(found: Kind, expected: Kind, at: usize, name: &str) -> Result<(), ExprError> {
+fn check(found: ExprKind, expected: ExprKind, at: usize, name: &str) -> Result<(), ExprError> {
     match (expected, found) {
-        (Kind::Number, Kind::Truth) => {
+        (ExprKind::Number, ExprKind::Truth) => {
             let message = format!("`{name}` takes numbers, this is a truth");
             Err(fault(at, message))
         }
-        (Kind::Truth, Kind::Number) => {
+        (ExprKind::Truth, ExprKind::Number) => {
             let message = format!("`{name}` takes truths such as `x > 1`, this is a number");
             Err(fault(at, message))
         }

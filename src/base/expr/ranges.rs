@@ -1,23 +1,23 @@
-//! What can come out when variables lie within ranges: the same operations on intervals.
+//! Interval evaluation: bounds of an expression while variables lie within ranges.
 //!
 //! Rounding is monotone, so the ends of the intervals of sums, products, quotients and roots, rounded as values are,
 //! hold all rounded values. Of the other functions nothing is claimed.
 
-use super::op::{Binary, Op, STACK_MAX, Unary};
+use super::op::{BinaryOp, Op, STACK_MAX, Unary};
 
-/// The values that can occur: numbers from `low` to `high`, and NaN perhaps. Of a truth, 0 and 1 are such numbers.
+/// Bounds of a value: numbers from `low` to `high`, perhaps NaN. For a truth the numbers are 0 and 1.
 #[derive(Clone, Copy, Debug)]
-struct Range {
+struct Interval {
     low: f64,
     high: f64,
     nan: bool,
 }
 
-const ANY: Range = Range { low: f64::NEG_INFINITY, high: f64::INFINITY, nan: true };
+const ANY: Interval = Interval { low: f64::NEG_INFINITY, high: f64::INFINITY, nan: true };
 
-impl Range {
+impl Interval {
     /// From values that are its ends; anything when one is not a number.
-    fn of(ends: &[f64], nan: bool) -> Self {
+    fn around(ends: &[f64], nan: bool) -> Self {
         if ends.iter().any(|e| e.is_nan()) {
             return ANY;
         }
@@ -52,22 +52,22 @@ pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]]) -> b
     for op in ops {
         match *op {
             Op::Constant(value) => {
-                stack[n] = Range::of(&[value], false);
+                stack[n] = Interval::around(&[value], false);
                 n += 1;
             }
             Op::Variable(v) => {
-                stack[n] = Range::of(&ranges[v], false);
+                stack[n] = Interval::around(&ranges[v], false);
                 n += 1;
             }
             Op::Unary(f) => stack[n - 1] = unary(f, stack[n - 1]),
-            Op::Binary(f) => {
+            Op::BinaryOp(f) => {
                 n -= 1;
                 stack[n - 1] = binary(f, stack[n - 1], stack[n]);
             }
             Op::In(list) => {
                 let x = stack[n - 1];
                 let within = |v: &f64| x.low <= *v && *v <= x.high;
-                stack[n - 1] = Range::truth(true, lists[list].iter().any(within));
+                stack[n - 1] = Interval::truth(true, lists[list].iter().any(within));
             }
             Op::If => {
                 n -= 2;
@@ -75,7 +75,7 @@ pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]]) -> b
                 stack[n - 1] = match (condition.low > 0.0, condition.high > 0.0) {
                     (true, _) => yes,
                     (_, false) => no,
-                    _ => Range::of(&[yes.low, yes.high, no.low, no.high], yes.nan || no.nan),
+                    _ => Interval::around(&[yes.low, yes.high, no.low, no.high], yes.nan || no.nan),
                 };
             }
         }
@@ -83,46 +83,54 @@ pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]]) -> b
     stack[0].high > 0.0
 }
 
-fn unary(f: Unary, x: Range) -> Range {
+fn unary(f: Unary, x: Interval) -> Interval {
     match f {
         Unary::Negate | Unary::Ceil | Unary::Floor | Unary::Round | Unary::Sign => {
-            Range::of(&[f.of(x.low), f.of(x.high)], x.nan)
+            Interval::around(&[f.apply(x.low), f.apply(x.high)], x.nan)
         }
-        Unary::Abs if x.holds_zero() => Range::of(&[0.0, x.low.abs(), x.high.abs()], x.nan),
-        Unary::Abs => Range::of(&[x.low.abs(), x.high.abs()], x.nan),
-        Unary::Sqrt if x.low >= 0.0 => Range::of(&[x.low.sqrt(), x.high.sqrt()], x.nan),
-        Unary::Not => Range::truth(x.high > 0.0, x.low <= 0.0),
-        Unary::Sin | Unary::Cos if x.is_bounded() => Range::of(&[-1.0, 1.0], x.nan),
+        Unary::Abs if x.holds_zero() => Interval::around(&[0.0, x.low.abs(), x.high.abs()], x.nan),
+        Unary::Abs => Interval::around(&[x.low.abs(), x.high.abs()], x.nan),
+        Unary::Sqrt if x.low >= 0.0 => Interval::around(&[x.low.sqrt(), x.high.sqrt()], x.nan),
+        Unary::Not => Interval::truth(x.high > 0.0, x.low <= 0.0),
+        Unary::Sin | Unary::Cos if x.is_bounded() => Interval::around(&[-1.0, 1.0], x.nan),
         Unary::Cos | Unary::Exp | Unary::Log | Unary::Sin | Unary::Sqrt | Unary::Tan => ANY,
     }
 }
 
-fn binary(f: Binary, a: Range, b: Range) -> Range {
+fn binary(f: BinaryOp, a: Interval, b: Interval) -> Interval {
     let nan = a.nan || b.nan;
-    let ends = |f: Binary| {
+    let ends = |f: BinaryOp| {
         let pairs = [(a.low, b.low), (a.low, b.high), (a.high, b.low), (a.high, b.high)];
-        pairs.map(|(a, b)| f.of(a, b))
+        pairs.map(|(a, b)| f.apply(a, b))
     };
-    // Infinite ends meet only where a range is unbounded: what is between them need not come near.
+    // Infinite ends meet only in an unbounded range, whose inner values need not come near.
     let bounded = a.is_bounded() && b.is_bounded();
     match f {
-        Binary::Add | Binary::Subtract | Binary::Multiply if bounded => Range::of(&ends(f), nan),
-        Binary::Divide if bounded && !b.holds_zero() => Range::of(&ends(f), nan),
-        Binary::Max | Binary::Min => Range::of(&ends(f), nan),
-        Binary::Add | Binary::Subtract | Binary::Multiply | Binary::Divide | Binary::Power => ANY,
-        Binary::Less => Range::truth(nan || a.high >= b.low, a.low < b.high),
-        Binary::LessEqual => Range::truth(nan || a.high > b.low, a.low <= b.high),
-        Binary::Greater => Range::truth(nan || a.low <= b.high, a.high > b.low),
-        Binary::GreaterEqual => Range::truth(nan || a.low < b.high, a.high >= b.low),
-        Binary::Equal | Binary::NotEqual => {
+        BinaryOp::Add | BinaryOp::Subtract | BinaryOp::Multiply if bounded => {
+            Interval::around(&ends(f), nan)
+        }
+        BinaryOp::Divide if bounded && !b.holds_zero() => Interval::around(&ends(f), nan),
+        BinaryOp::Max | BinaryOp::Min => Interval::around(&ends(f), nan),
+        BinaryOp::Add
+        | BinaryOp::Subtract
+        | BinaryOp::Multiply
+        | BinaryOp::Divide
+        | BinaryOp::Power => ANY,
+        BinaryOp::Less => Interval::truth(nan || a.high >= b.low, a.low < b.high),
+        BinaryOp::LessEqual => Interval::truth(nan || a.high > b.low, a.low <= b.high),
+        BinaryOp::Greater => Interval::truth(nan || a.low <= b.high, a.high > b.low),
+        BinaryOp::GreaterEqual => Interval::truth(nan || a.low < b.high, a.high >= b.low),
+        BinaryOp::Equal | BinaryOp::NotEqual => {
             let may_be_one = a.low <= b.high && b.low <= a.high;
             let must_be_one = !nan && a.low == b.high && a.high == b.low;
             match f {
-                Binary::Equal => Range::truth(!must_be_one, may_be_one),
-                _ => Range::truth(may_be_one, !must_be_one),
+                BinaryOp::Equal => Interval::truth(!must_be_one, may_be_one),
+                _ => Interval::truth(may_be_one, !must_be_one),
             }
         }
-        Binary::And => Range::truth(a.low <= 0.0 || b.low <= 0.0, a.high > 0.0 && b.high > 0.0),
-        Binary::Or => Range::truth(a.low <= 0.0 && b.low <= 0.0, a.high > 0.0 || b.high > 0.0),
+        BinaryOp::And => {
+            Interval::truth(a.low <= 0.0 || b.low <= 0.0, a.high > 0.0 && b.high > 0.0)
+        }
+        BinaryOp::Or => Interval::truth(a.low <= 0.0 && b.low <= 0.0, a.high > 0.0 || b.high > 0.0),
     }
 }

@@ -2,11 +2,11 @@
 
 use proptest::prelude::*;
 
-use super::{Expression, Kind};
+use super::{ExprKind, Expression};
 
 const NAMES: [&str; 3] = ["x", "y", "quality"];
 
-/// An expression as a tree; numbers and truths are told apart by where they stand.
+/// An expression as a tree; the position distinguishes numbers from truths.
 #[derive(Clone, Debug)]
 enum Tree {
     Number(f64),
@@ -159,7 +159,7 @@ proptest! {
     fn numbers_are_those_of_the_tree(tree in number(), values in prop::array::uniform3(value())) {
         let text = tree.text();
         let expression = Expression::parse(&text, &NAMES).map_err(|e| TestCaseError::fail(format!("{text}: {e}")))?;
-        prop_assert_eq!(expression.kind(), Kind::Number);
+        prop_assert_eq!(expression.kind(), ExprKind::Number);
         let (found, expected) = (expression.number(&values), tree.number(&values));
         prop_assert!(found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan(), "{}: {} {}", text, found, expected);
     }
@@ -171,7 +171,7 @@ proptest! {
         prop_assert_eq!(expression.truth(&values), tree.truth(&values), "{}", text);
     }
 
-    /// What holds somewhere in a range may hold there.
+    /// A condition that holds at a point of a range must be possible in that range.
     #[test]
     fn ranges_leave_nothing_out(
         tree in truth(),
@@ -203,7 +203,7 @@ proptest! {
     ) {
         let text = words.join(" ");
         match Expression::parse(&text, &NAMES) {
-            Ok(e) if e.kind() == Kind::Truth => _ = e.truth(&[1.0, 2.0, 3.0]),
+            Ok(e) if e.kind() == ExprKind::Truth => _ = e.truth(&[1.0, 2.0, 3.0]),
             Ok(e) => _ = e.number(&[1.0, 2.0, 3.0]),
             Err(e) => prop_assert!(text.is_char_boundary(e.at), "{:?} at {}", text, e.at),
         }

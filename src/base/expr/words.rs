@@ -1,10 +1,10 @@
-//! Text to words with their places.
+//! Splits text into tokens with their places.
 
 use super::ExprError;
 
 /// A word of an expression.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Word<'a> {
+pub(super) enum Token<'a> {
     Number(f64),
     Name(&'a str),
     /// An operator, bracket or comma.
@@ -16,7 +16,7 @@ pub(super) enum Word<'a> {
 const SIGNS: [&str; 17] =
     ["==", "!=", "<=", ">=", "=", "<", ">", "+", "-", "*", "/", "^", "(", ")", "[", "]", ","];
 
-/// Signs of other languages, and what to write here.
+/// Operators of other languages, and their replacement here.
 const FOREIGN: [(&str, &str); 7] = [
     ("&&", "`and`"),
     ("||", "`or`"),
@@ -30,33 +30,33 @@ const FOREIGN: [(&str, &str); 7] = [
 /// The word at or after `at`, where it begins and where it ends.
 ///
 /// Errors: a character no word has; a number that cannot be read.
-pub(super) fn next_word(text: &str, at: usize) -> Result<(Word<'_>, usize, usize), ExprError> {
+pub(super) fn next_word(text: &str, at: usize) -> Result<(Token<'_>, usize, usize), ExprError> {
     let rest = &text[at..];
     let start = at + (rest.len() - rest.trim_start().len());
     let rest = &text[start..];
     let Some(first) = rest.chars().next() else {
-        return Ok((Word::End, text.len(), text.len()));
+        return Ok((Token::End, text.len(), text.len()));
     };
     if first.is_ascii_digit() || first == '.' {
         let length = number_length(rest.as_bytes());
         let value = rest[..length].parse::<f64>();
-        // Beyond the greatest double a text reads as infinite, which nobody means.
+        // Beyond the greatest double a text reads as infinite, which is never intended.
         let value = value.ok().filter(|v| v.is_finite());
         return match value {
-            Some(value) => Ok((Word::Number(value), start, start + length)),
+            Some(value) => Ok((Token::Number(value), start, start + length)),
             None => Err(fault(start, format!("{:?} is not a number", &rest[..length]))),
         };
     }
     if first.is_alphabetic() || first == '_' {
         let length = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
-        return Ok((Word::Name(&rest[..length]), start, start + length));
+        return Ok((Token::Name(&rest[..length]), start, start + length));
     }
     let foreign = FOREIGN.iter().find(|(sign, _)| rest.starts_with(sign));
     if let Some(&(sign, ours)) = foreign.filter(|_| !rest.starts_with("!=")) {
         return Err(fault(start, format!("write {ours} instead of `{sign}`")));
     }
     match SIGNS.iter().find(|sign| rest.starts_with(**sign)) {
-        Some(sign) => Ok((Word::Sign(sign), start, start + sign.len())),
+        Some(sign) => Ok((Token::Sign(sign), start, start + sign.len())),
         None => Err(fault(start, format!("{first:?} means nothing here"))),
     }
 }

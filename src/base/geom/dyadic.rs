@@ -1,4 +1,4 @@
-//! Whole numbers times powers of two: sums and products of doubles, without rounding and without a range to leave.
+//! Whole numbers times powers of two: exact sums and products of doubles, of any size.
 
 use std::cmp::Ordering;
 
@@ -137,7 +137,7 @@ impl Dyadic {
         }
     }
 
-    /// How `self` stands to `other`.
+    /// Order of `self` and `other`.
     pub fn compare(&self, other: &Self) -> Ordering {
         self.minus(other).sign().cmp(&0)
     }

@@ -1,4 +1,4 @@
-//! Numbers that look random, made of numbers: the same on every machine.
+//! Pseudo-random numbers from numbers, equal on every machine.
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
@@ -14,14 +14,14 @@ pub fn mix(v: u64) -> u64 {
     z ^ z >> 31
 }
 
-/// What SplitMix64 adds to its state at each step.
+/// Increment of the state of SplitMix64.
 pub const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// Spreads numbers over the places of a table; they are the program's own, not an adversary's.
+/// A hasher for the program's own numbers, such as ids; it does not resist an adversary.
 #[derive(Default)]
-pub struct Spread(u64);
+pub struct IdHasher(u64);
 
-impl Hasher for Spread {
+impl Hasher for IdHasher {
     fn finish(&self) -> u64 {
         self.0
     }
@@ -52,6 +52,6 @@ impl Hasher for Spread {
 }
 
 /// A table by numbers of the program's own, such as ids.
-pub type IdMap<K, V> = HashMap<K, V, BuildHasherDefault<Spread>>;
+pub type IdMap<K, V> = HashMap<K, V, BuildHasherDefault<IdHasher>>;
 /// A set of them.
-pub type IdSet<K> = HashSet<K, BuildHasherDefault<Spread>>;
+pub type IdSet<K> = HashSet<K, BuildHasherDefault<IdHasher>>;

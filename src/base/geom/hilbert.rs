@@ -34,8 +34,8 @@ impl HilbertFrame {
 
 /// Index along the three-dimensional Hilbert curve of a cell with 21 bits per axis.
 ///
-/// Walks down the levels with the curve's turning as a state, two levels at a time: three times as fast as turning the lower bits
-/// themselves at each level, which is what the tables are made from.
+/// Walks down the levels, two at a time, with the curve's orientation as a state. Turning the lower bits at each level,
+/// from which the tables are computed, takes three times as long.
 ///
 /// Source: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707 (2004).
 #[inline]
@@ -57,9 +57,10 @@ pub fn hilbert_index(cell: [u32; 3]) -> u64 {
     index
 }
 
-/// How the curve is turned at a level: which axis each of its axes is, which of them run backward, and whether its digits do.
+/// Orientation of the curve at a level: the axis that each of its axes is, the axes that run backward, and whether its
+/// digits do.
 #[derive(Clone, Copy)]
-struct Turn {
+struct CurveTurn {
     axis: [u8; 3],
     back: [bool; 3],
     digits_back: bool,
@@ -69,7 +70,7 @@ struct Turn {
 const TURNS: usize = 96;
 const ORDERS: [[u8; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-impl Turn {
+impl CurveTurn {
     const fn from_number(n: usize) -> Self {
         Self {
             axis: ORDERS[n / 16],
@@ -126,7 +127,7 @@ const ONE_LEVEL: [[(u8, u8); 8]; TURNS] = {
     while n < TURNS {
         let mut bits = 0;
         while bits < 8 {
-            let (digit, next) = Turn::from_number(n).step(bits);
+            let (digit, next) = CurveTurn::from_number(n).step(bits);
             table[n][bits] = (digit, next.number() as u8);
             bits += 1;
         }

@@ -1,4 +1,4 @@
-//! Points, planes and exact signs. This module knows no mesh.
+//! Points, planes and exact signs. The module has no mesh.
 //!
 //! One convention holds everywhere (drawn in `shape`): a tetrahedron `a b c d` is positive
 //! when `det(b-a, c-a, d-a) > 0`, and [`insphere`] is positive inside the sphere of a positive one.
@@ -13,16 +13,15 @@ mod sign;
 mod wide;
 
 #[cfg(test)]
-mod oracle;
-#[cfg(test)]
 mod tests;
 
 pub use dyadic::Dyadic;
 pub use hash::{IdMap, IdSet, STEP, mix};
 pub use hilbert::{HilbertFrame, hilbert_index};
 pub use number::short;
-pub use pair::Pair;
+pub use pair::DoublePair;
 pub use point::{Aabb, Point};
 pub use sign::{
-    Seen, in_sphere_perturbed, insphere, insphere_filtered, larger, lex_cmp, orient, orient_sign,
+    RelativePoint, in_sphere_perturbed, insphere, insphere_filtered, larger, lex_cmp, orient,
+    orient_sign,
 };

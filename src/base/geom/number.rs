@@ -1,4 +1,4 @@
-//! Numbers as a person reads them.
+//! Numbers in a short form for people.
 
 /// A number with at most four significant digits; very large and very small ones with a power of ten.
 pub fn short(x: f64) -> String {

@@ -40,7 +40,7 @@ impl Aabb {
         (self.high - self.low).length()
     }
 
-    /// Whether the two closed boxes share a point.
+    /// Returns whether the two closed boxes share a point.
     pub fn meets(&self, other: &Self) -> bool {
         self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
     }

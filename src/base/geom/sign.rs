@@ -1,9 +1,9 @@
-//! Signs of the orientation and sphere determinants, never wrong.
+//! Exact signs of the orientation and sphere determinants.
 //!
-//! Each call first evaluates the determinant in doubles and compares it with a bound made from the
-//! largest coordinate differences of that very call (a semi-static filter: a bound for the whole
-//! bounding box never succeeds on small tetrahedra). What the filter cannot decide goes to whole numbers
-//! (`wide`, spheres only) where they fit, else to the expansions of the crate `robust`.
+//! Each call first evaluates the determinant in doubles. It compares the result with a bound from the largest
+//! coordinate differences of that very call. (Such a semi-static filter works on small tetrahedra, where a bound for
+//! the whole bounding box fails.) Undecided cases go to whole numbers (`wide`, spheres only) where they fit, else to
+//! the expansions of the crate `robust`.
 //!
 //! Zero sphere determinants are decided by raising the lift of the points symbolically, the
 //! lexicographically smallest point by most (Devillers and Teillaud, "Perturbations for Delaunay and
@@ -19,7 +19,7 @@ use super::wide::insphere_sign;
 /// Forward error of the filtered orientation determinant, relative to the product of the largest
 /// differences per axis (Meyer and Pion, "FPG: a code generator for fast and certified geometric predicates").
 const ORIENT_BOUND: f64 = 5.110_712_782_997_33e-15;
-/// The same for the sphere determinant, relative to that product times the largest squared difference.
+/// Forward error of the filtered sphere determinant, relative to that product times the largest squared difference.
 const INSPHERE_BOUND: f64 = 1.246_613_653_102_729_8e-13;
 /// Below this difference a product can underflow and the bounds stop being bounds.
 const DIFFERENCE_MIN: f64 = 1e-58;
@@ -83,7 +83,7 @@ fn orient_slow(a: Point, b: Point, c: Point, d: Point) -> f64 {
     if det == 0.0 {
         return 0.0;
     }
-    // Back in input units, for those who add volumes; a volume too small for a double keeps its sign.
+    // Back in input units, for callers that add volumes; a volume too small for a double keeps its sign.
     let volume = det * unit * unit * unit;
     volume.abs().clamp(f64::MIN_POSITIVE, f64::MAX).copysign(det)
 }
@@ -102,12 +102,12 @@ pub fn orient_sign(a: Point, b: Point, c: Point, d: Point) -> Ordering {
 
 /// A point as seen from another: the difference and its square.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct RelativePoint {
     d: Point,
     square: f64,
 }
 
-impl Seen {
+impl RelativePoint {
     /// `a` as seen from `e`.
     #[inline(always)]
     pub fn new(a: Point, e: Point) -> Self {
@@ -118,7 +118,12 @@ impl Seen {
 
 /// Sphere determinant of four points seen from a fifth; positive when the fifth is inside.
 #[inline(always)]
-fn seen_determinant(a: &Seen, b: &Seen, c: &Seen, d: &Seen) -> f64 {
+fn relative_determinant(
+    a: &RelativePoint,
+    b: &RelativePoint,
+    c: &RelativePoint,
+    d: &RelativePoint,
+) -> f64 {
     let (a1, b1, c1, d1) = (a.d, b.d, c.d, d.d);
     let ab = a1.x * b1.y - b1.x * a1.y;
     let bc = b1.x * c1.y - c1.x * b1.y;
@@ -135,8 +140,13 @@ fn seen_determinant(a: &Seen, b: &Seen, c: &Seen, d: &Seen) -> f64 {
 
 /// [`insphere`] of four points already seen from the fifth; zero also when the doubles cannot decide.
 #[inline(always)]
-pub fn insphere_filtered(a: &Seen, b: &Seen, c: &Seen, d: &Seen) -> f64 {
-    let det = seen_determinant(a, b, c, d);
+pub fn insphere_filtered(
+    a: &RelativePoint,
+    b: &RelativePoint,
+    c: &RelativePoint,
+    d: &RelativePoint,
+) -> f64 {
+    let det = relative_determinant(a, b, c, d);
     let square = larger(larger(a.square, b.square), larger(c.square, d.square));
     let fourth = (square * square) * (square * square);
     if square > SQUARE_MIN
@@ -153,7 +163,12 @@ pub fn insphere_filtered(a: &Seen, b: &Seen, c: &Seen, d: &Seen) -> f64 {
 /// The sign is exact, the magnitude is not; zero means that the five points lie on one sphere.
 #[inline(always)]
 pub fn insphere(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
-    let [s, t, u, v] = [Seen::new(a, e), Seen::new(b, e), Seen::new(c, e), Seen::new(d, e)];
+    let [s, t, u, v] = [
+        RelativePoint::new(a, e),
+        RelativePoint::new(b, e),
+        RelativePoint::new(c, e),
+        RelativePoint::new(d, e),
+    ];
     let det = insphere_filtered(&s, &t, &u, &v);
     if det != 0.0 { det } else { insphere_slow(a, b, c, d, e) }
 }
@@ -162,8 +177,13 @@ pub fn insphere(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
 #[cold]
 #[inline(never)]
 fn insphere_slow(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
-    let [s, t, u, v] = [Seen::new(a, e), Seen::new(b, e), Seen::new(c, e), Seen::new(d, e)];
-    let det = seen_determinant(&s, &t, &u, &v);
+    let [s, t, u, v] = [
+        RelativePoint::new(a, e),
+        RelativePoint::new(b, e),
+        RelativePoint::new(c, e),
+        RelativePoint::new(d, e),
+    ];
+    let det = relative_determinant(&s, &t, &u, &v);
     let m = s.d.abs().max(t.d.abs()).max(u.d.abs()).max(v.d.abs());
     let largest = m.max_element();
     if det.abs() > INSPHERE_BOUND * (m.x * m.y * m.z) * (largest * largest)
@@ -187,7 +207,7 @@ pub fn lex_cmp(a: Point, b: Point) -> Ordering {
     (a.x, a.y, a.z).partial_cmp(&(b.x, b.y, b.z)).expect("coordinates are finite")
 }
 
-/// Whether `e` is strictly inside the perturbed sphere of the positive tetrahedron `a b c d`.
+/// Returns whether `e` is strictly inside the perturbed sphere of the positive tetrahedron `a b c d`.
 ///
 /// The five points must be pairwise different. Never undecided.
 #[inline(always)]

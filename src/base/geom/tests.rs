@@ -1,14 +1,17 @@
-//! Signs against exact numbers, on points made to be hard.
+//! Signs compared with exact numbers, on points chosen to be hard.
 //!
-//! Why: one wrong sign is a wrong mesh. How: a hundred thousand cases of each kind ("TETDB_CASES" asks for more), among them
-//! points in one plane and on one sphere, one unit in the last place off, far from the origin, of mixed magnitudes.
+//! Why: one wrong sign is a wrong mesh. How: a hundred thousand cases of each kind ("TETDB_CASES" sets another number).
+//! They include points in one plane and on one sphere, off by one unit in the last place, far from the origin, of mixed
+//! magnitudes.
+
+pub(super) mod oracle;
 
 use std::cmp::Ordering;
 
-use super::oracle::{Numbers, cases, exact, insphere_truth, orient_truth};
 use super::{Point, in_sphere_perturbed, insphere, orient};
+use oracle::{RandomNumbers, cases, exact, insphere_truth, orient_truth};
 
-impl Numbers {
+impl RandomNumbers {
     /// One unit in the last place up, down, or none, on each axis.
     fn nudged(&mut self, p: Point) -> Point {
         Point::from_array(p.to_array().map(|x| match (self.next() * 6.0) as i32 {
@@ -20,20 +23,20 @@ impl Numbers {
 }
 
 /// Five points of the kind `k`.
-fn hard_points(numbers: &mut Numbers, k: usize) -> [Point; 5] {
+fn hard_points(numbers: &mut RandomNumbers, k: usize) -> [Point; 5] {
     let offset = numbers.point() * [0.0, 1.0, 1e3, 1e8][k / 8 % 4];
     let scale = [1.0, 1e-12, 1e20, 1e-25][k / 32 % 4];
     let (a, b, c) = (numbers.point(), numbers.point(), numbers.point());
     let mut p = match k % 8 {
         // On a small grid: exact ties of all kinds.
         0 => [0; 5].map(|_| (numbers.point() * 4.0).round()),
-        // In the plane of the first three, as well as doubles can say.
+        // In the plane of the first three, up to rounding.
         1 | 2 => {
             let mut mix = || a + (b - a) * numbers.next() + (c - a) * numbers.next();
             let (d, e) = (mix(), mix());
             [a, b, c, d, e]
         }
-        // On one sphere, as well as doubles can say.
+        // On one sphere, up to rounding.
         3 | 4 => [0; 5].map(|_| a + numbers.point().normalize_or_zero() * 0.7),
         // On a line.
         5 => [0; 5].map(|_| a + (b - a) * numbers.next()),
@@ -56,7 +59,7 @@ fn sign(x: f64) -> Ordering {
 
 #[test]
 fn signs_are_those_of_exact_numbers() {
-    let mut numbers = Numbers(3);
+    let mut numbers = RandomNumbers(3);
     let mut seen = [[0u32; 3]; 2];
     for k in 0..cases() {
         let p = hard_points(&mut numbers, k);
@@ -68,14 +71,14 @@ fn signs_are_those_of_exact_numbers() {
         assert_eq!(sign(insphere(a, b, c, d, e)), truth, "{p:?}");
         seen[1][(truth as i8 + 1) as usize] += 1;
     }
-    // All answers were asked for.
+    // All cases were tested.
     let least = cases() as u32 / 50;
     assert!(seen.iter().flatten().all(|&n| n > least), "{seen:?}");
 }
 
 #[test]
 fn ties_are_decided_alike_from_every_side() {
-    let mut numbers = Numbers(5);
+    let mut numbers = RandomNumbers(5);
     let mut ties = 0;
     for _ in 0..cases() / 10 {
         let p = [0; 5].map(|_| (numbers.point() * 4.0).round());

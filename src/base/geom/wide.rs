@@ -22,14 +22,15 @@ pub(super) fn insphere_sign(a: Point, b: Point, c: Point, d: Point, e: Point) ->
 
 /// The differences where doubles hold them exactly, as they do for points near each other and not too near zero.
 ///
-/// The unit is as small as the largest difference allows: what it is does not matter, if all are whole numbers of it.
+/// The unit is as small as the largest difference allows. Its value does not matter, if all coordinates are whole
+/// numbers of it.
 fn rounded_differences(points: [Point; 4], e: Point) -> Option<[[i64; 3]; 4]> {
     let mut seen = [Point::ZERO; 4];
     let mut largest = Point::ZERO;
     let mut lost = Point::ZERO;
     for (seen, p) in seen.iter_mut().zip(points) {
         let x = p - e;
-        // What rounding took away (T. J. Dekker, 1971).
+        // The rounding error (T. J. Dekker, 1971).
         let e_virtual = p - x;
         let tail = (p - (x + e_virtual)) + (e_virtual - e);
         lost += tail.abs();
@@ -123,7 +124,7 @@ fn determinant_sign([a, b, c, d]: [[i64; 3]; 4]) -> Ordering {
         let square = |x: i64| i128::from(x) * i128::from(x);
         (square(p[0]) + square(p[1]) + square(p[2])) as u128
     };
-    let mut det = Columns::default();
+    let mut det = DigitColumns::default();
     det.add(square(a), bcd);
     det.add(square(b), minus_cda);
     det.add(square(c), dab);
@@ -133,7 +134,7 @@ fn determinant_sign([a, b, c, d]: [[i64; 3]; 4]) -> Ordering {
 
 /// A whole number of three words, negative ones as complement.
 ///
-/// Signs are as good as random here, and a branch on one is guessed wrong every other time: there is none.
+/// Signs are nearly random here, and a branch would be mispredicted every other time: there is none.
 #[derive(Clone, Copy)]
 struct Triple {
     low: u64,
@@ -159,9 +160,9 @@ impl Triple {
 
 /// A sum of products of five words, as sums of their words: of a few dozen, each of 64 bits, so that none overflows.
 #[derive(Default)]
-struct Columns([i128; 5]);
+struct DigitColumns([i128; 5]);
 
-impl Columns {
+impl DigitColumns {
     /// Adds the product of a square of 124 bits and a determinant of three rows of 186.
     #[inline(always)]
     fn add(&mut self, square: u128, det: Triple) {
@@ -195,12 +196,12 @@ impl Columns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::oracle::Numbers;
-    use crate::geom::oracle::{exact, insphere_truth};
+    use crate::geom::tests::oracle::RandomNumbers;
+    use crate::geom::tests::oracle::{exact, insphere_truth};
 
     #[test]
     fn nearly_all_points_of_one_sphere_fit_and_get_their_sign() {
-        let mut numbers = Numbers(7);
+        let mut numbers = RandomNumbers(7);
         let (mut decided, mut ties) = (0, 0);
         for round in 0..4000 {
             let center = numbers.point() * 3.0;

@@ -1,4 +1,4 @@
-//! What the surface forces: the least q that a tetrahedron can have, given its required faces.
+//! The least q that a tetrahedron can have, given its required faces.
 //!
 //! **One required face.** A tetrahedron on triangle T with apex d has q = α L / r, with L its longest edge and r its inradius,
 //! ```text
@@ -9,10 +9,10 @@
 //! found by search (`climb`) from two starts. No tetrahedron is better than α ℓ / ρ (ℓ the longest edge of T, ρ the radius of its
 //! inscribed circle), and a needle comes near that: [`face_floor`] is cheap and never above the minimum.
 //!
-//! **Two required faces** and more. Between two triangles that meet at angle θ, a tetrahedron that stands on one of them has a
-//! dihedral angle of at most θ at their common edge, whatever lies between them. The bound of a face is then the least q of apexes within
-//! that angle: the minimum above where that lies within, else the least one on the plane at angle θ. The tetrahedron that
-//! has both faces is not forced to be what it is by having both: an inner vertex can divide it.
+//! **Two required faces** and more. Let two triangles meet at angle θ. A tetrahedron on one of them has a dihedral
+//! angle of at most θ at their common edge. The bound of a face is then the least q of apexes within that angle: the
+//! minimum above, if it lies within, else the least one on the plane at angle θ. Having both faces does not force the
+//! tetrahedron: an inner vertex can divide it.
 //!
 //! The bound of a tetrahedron is the largest of those of its required faces, 1 without any. Four vertices on the surface
 //! force nothing. *Excess* is q over the bound.
@@ -22,7 +22,7 @@ use super::climb::Climb;
 use super::quality::{face_bound, quality};
 use crate::geom::Point;
 
-/// Steps of a search. The minimum is then met within 1 in 1000 (see the tests); a bound within that is as good as exact.
+/// Steps of a search. The minimum is then met within 1 in 1000 (see the tests), which suffices for the bound.
 const STEPS: u32 = 160;
 
 /// A triangle as the base of tetrahedra, moved and scaled: from the origin along x, then to y > 0; longest edge 1.
@@ -155,7 +155,7 @@ pub fn least(points: [Point; 4], required: [bool; 4]) -> f64 {
     bound.min(own)
 }
 
-/// q over the bound: 1 for a tetrahedron as good as the surface lets it be.
+/// q over the bound: 1 for a tetrahedron of the best quality that the surface allows.
 pub fn excess(points: [Point; 4], required: [bool; 4]) -> f64 {
     let (q, bound) = (quality(points), least(points, required));
     if bound.is_finite() { q / bound } else { 1.0 }
@@ -264,7 +264,7 @@ mod tests {
         assert!(flat < 1.01 && excess(wedge(179.9), both) > 100.0, "{flat}");
         let none = excess(wedge(179.9), [false; 4]);
         assert!((none / quality(wedge(179.9)) - 1.0).abs() < 1e-12);
-        // The same wedge whichever of its vertices comes first.
+        // The result does not depend on which vertex of the wedge comes first.
         let [a, b, c, d] = wedge(5.0);
         let turned = least([c, d, a, b], [true, true, false, false]);
         assert!((turned / sharp - 1.0).abs() < 2e-3, "{turned} {sharp}");

@@ -1,4 +1,4 @@
-//! The least q of tetrahedra on a triangle, from a table: for columns of millions of tetrahedra, where a search for each takes too long.
+//! The least q of tetrahedra on a triangle, from a table: a search for each of millions of tetrahedra takes too long.
 
 use std::sync::OnceLock;
 

@@ -12,11 +12,11 @@ use crate::geom::Point;
 /// succeeds; then they keep their length.
 const LONGER: f64 = 1.6;
 const SHORTER: f64 = 0.8;
-/// Share of a successful step that is added to those after it, and what is left of that after a step.
+/// Share of a successful step that is added to later steps, and the share of it that remains after each step.
 const BEND: f64 = 0.4;
 const BEND_LEFT: f64 = 0.5;
 
-/// Where a search begins and ends.
+/// Begin and end of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct Climb {
     /// The first place.

@@ -1,6 +1,6 @@
 //! The shape of one tetrahedron: its quality q, and the least q that its required faces allow.
 //!
-//! Knows four points, no mesh.
+//! Uses four points, no mesh.
 
 mod anatomy;
 mod bound;
@@ -13,5 +13,6 @@ pub use bound::{excess, face_floor, face_least, face_most, least};
 pub use bound_table::excess_near;
 pub use climb::Climb;
 pub use quality::{
-    ALPHA, CONTENT, GOODNESS_WANTED, face_bound, inverse_quality, is_below, is_forcing, quality,
+    ALPHA, CONTENT, INVERSE_QUALITY_WANTED, face_bound, inverse_quality, is_below, is_forcing,
+    quality,
 };

@@ -8,9 +8,9 @@ use crate::geom::{Point, orient};
 pub const ALPHA: f64 = 0.204_124_145_231_931_5;
 
 /// Goodness of a tetrahedron that is left alone: q = 2, the first bin of the table.
-pub const GOODNESS_WANTED: f64 = 0.5;
+pub const INVERSE_QUALITY_WANTED: f64 = 0.5;
 
-/// What both measures are made of.
+/// Common parts of both measures.
 struct Parts {
     /// Six times the volume, rounded.
     det: f64,
@@ -74,12 +74,12 @@ pub fn face_bound([a, b, c]: [Point; 3]) -> f64 {
     radius / (ALPHA * longest)
 }
 
-/// Whether every tetrahedron on a face has q of 2 or more, whatever its fourth vertex.
+/// Returns whether every tetrahedron on a face has q of 2 or more, for any fourth vertex.
 pub fn is_forcing(corners: [Point; 3]) -> bool {
-    face_bound(corners) <= GOODNESS_WANTED
+    face_bound(corners) <= INVERSE_QUALITY_WANTED
 }
 
-/// Whether the goodness is below `wanted` (at most); decides most good ones without a root or a division.
+/// Returns whether the goodness is below `wanted` (at most); decides most good ones without a root or a division.
 #[inline(always)]
 pub fn is_below(points: [Point; 4], wanted: f64) -> bool {
     let p = parts(points);

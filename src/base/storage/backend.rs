@@ -1,4 +1,5 @@
-//! What redb writes to: a file of a disk, whose commits reach the disk or, for a while, only the system.
+//! Backends of redb: a file of a disk whose commits are synced, one whose commits are not, and a private copy in
+//! memory.
 
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind};
@@ -8,92 +9,79 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use redb::{BackendError, StorageBackend};
 
 /// A file of a [`Disk`](super::Disk) as redb takes it.
-#[derive(Debug)]
-pub(super) struct Synced(pub Box<dyn StorageBackend>);
-
-/// A redb file that is not synced at its commits.
 ///
-/// A file that the catalog does not list yet is worth nothing after a crash, whatever reached the disk; the commit that lists it syncs
-/// it as a whole first. Syncing each batch instead was most of the time of a cut with very few frames. Is not: for files that are
-/// changed in place once they are listed, nor for several processes; it takes no lock.
+/// Without syncing it serves one process alone: it takes no lock, and a commit reaches only the system. A file that the
+/// catalog does not list yet is worthless after a crash; the commit that lists it first syncs it as a whole. Syncing each
+/// batch instead was most of the time of a cut with very few frames. Is not, unsynced: for files that change in place once
+/// they are listed.
 #[derive(Debug)]
-pub(super) struct Unsynced(pub Box<dyn StorageBackend>);
-
-impl StorageBackend for Unsynced {
-    fn len(&self) -> io::Result<u64> {
-        self.0.len()
-    }
-
-    fn read(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        self.0.read(offset, out)
-    }
-
-    fn set_len(&self, len: u64) -> io::Result<()> {
-        self.0.set_len(len)
-    }
-
-    fn sync_data(&self) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn write(&self, offset: u64, data: &[u8]) -> io::Result<()> {
-        self.0.write(offset, data)
-    }
-
-    fn close(&self) -> io::Result<()> {
-        self.0.close()
-    }
+pub(super) struct DiskFile {
+    pub file: Box<dyn StorageBackend>,
+    pub is_synced: bool,
 }
 
 type LockResult<T> = Result<T, BackendError>;
 
-impl StorageBackend for Synced {
+impl DiskFile {
+    /// The file, if it takes locks.
+    fn locks(&self) -> LockResult<&dyn StorageBackend> {
+        match self.is_synced {
+            true => Ok(&*self.file),
+            false => Err(BackendError::Unsupported),
+        }
+    }
+}
+
+impl StorageBackend for DiskFile {
     fn len(&self) -> io::Result<u64> {
-        self.0.len()
+        self.file.len()
     }
 
     fn read(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        self.0.read(offset, out)
+        self.file.read(offset, out)
     }
 
     fn set_len(&self, len: u64) -> io::Result<()> {
-        self.0.set_len(len)
+        self.file.set_len(len)
     }
 
     fn sync_data(&self) -> io::Result<()> {
-        self.0.sync_data()
+        match self.is_synced {
+            true => self.file.sync_data(),
+            false => Ok(()),
+        }
     }
 
     fn write(&self, offset: u64, data: &[u8]) -> io::Result<()> {
-        self.0.write(offset, data)
+        self.file.write(offset, data)
     }
 
     fn close(&self) -> io::Result<()> {
-        self.0.close()
+        self.file.close()
     }
 
     fn try_lock_range(&self, start: Bound<u64>, end: Bound<u64>) -> LockResult<bool> {
-        self.0.try_lock_range(start, end)
+        self.locks()?.try_lock_range(start, end)
     }
 
     fn try_lock_shared_range(&self, start: Bound<u64>, end: Bound<u64>) -> LockResult<bool> {
-        self.0.try_lock_shared_range(start, end)
+        self.locks()?.try_lock_shared_range(start, end)
     }
 
     fn lock_range(&self, start: Bound<u64>, end: Bound<u64>) -> LockResult<()> {
-        self.0.lock_range(start, end)
+        self.locks()?.lock_range(start, end)
     }
 
     fn lock_shared_range(&self, start: Bound<u64>, end: Bound<u64>) -> LockResult<()> {
-        self.0.lock_shared_range(start, end)
+        self.locks()?.lock_shared_range(start, end)
     }
 
     fn unlock_range(&self, start: Bound<u64>, end: Bound<u64>) -> LockResult<()> {
-        self.0.unlock_range(start, end)
+        self.locks()?.unlock_range(start, end)
     }
 
     fn query_lock_range(&self, start: Bound<u64>, end: Bound<u64>) -> LockResult<bool> {
-        self.0.query_lock_range(start, end)
+        self.locks()?.query_lock_range(start, end)
     }
 }
 
@@ -101,34 +89,34 @@ const BLOCK: u64 = 4096;
 
 /// A file as it would be if it were written to: changes stay in memory.
 ///
-/// For a database that may not be changed, which redb opens only to change it. Memory: what is written.
+/// For a database that must not change, which redb can open only for writing. Memory: the bytes written.
 #[derive(Debug)]
 pub(super) struct Private {
     file: Box<dyn StorageBackend>,
-    changes: Mutex<Changes>,
+    changes: Mutex<PrivateChanges>,
 }
 
 #[derive(Debug)]
-struct Changes {
+struct PrivateChanges {
     len: u64,
-    /// The file counts up to here; what is beyond it and in no block is zero.
+    /// Length of the valid part of the file; bytes beyond it that are in no block are zero.
     len_of_file: u64,
     blocks: BTreeMap<u64, [u8; BLOCK as usize]>,
 }
 
 impl Private {
-    pub(super) fn new(file: Box<dyn StorageBackend>) -> io::Result<Self> {
+    pub fn new(file: Box<dyn StorageBackend>) -> io::Result<Self> {
         let len = file.len()?;
-        let changes = Mutex::new(Changes { len, len_of_file: len, blocks: BTreeMap::new() });
+        let changes = Mutex::new(PrivateChanges { len, len_of_file: len, blocks: BTreeMap::new() });
         Ok(Self { file, changes })
     }
 
-    fn changes(&self) -> MutexGuard<'_, Changes> {
+    fn changes(&self) -> MutexGuard<'_, PrivateChanges> {
         self.changes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Reads past the changes.
-    fn read_file(&self, changes: &Changes, offset: u64, out: &mut [u8]) -> io::Result<()> {
+    fn read_file(&self, changes: &PrivateChanges, offset: u64, out: &mut [u8]) -> io::Result<()> {
         let within = changes.len_of_file.saturating_sub(offset);
         let n = out.len().min(usize::try_from(within).unwrap_or(usize::MAX));
         let (inside, beyond) = out.split_at_mut(n);

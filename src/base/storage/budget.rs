@@ -1,4 +1,4 @@
-//! The ledger of memory: everything proportional to the work is leased here first.
+//! The ledger of memory: memory that grows with the work is leased here first.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -19,6 +19,19 @@ pub fn raise(error: StorageError) -> ! {
     resume_unwind(Box::new(error))
 }
 
+/// The value of a storage operation; a failure unwinds to the surrounding [`attempt`].
+pub trait OrRaise<T> {
+    /// Returns the value, or unwinds with the error as [`raise`] does.
+    fn or_raise(self) -> T;
+}
+
+impl<T> OrRaise<T> for Result<T, StorageError> {
+    #[inline]
+    fn or_raise(self) -> T {
+        self.unwrap_or_else(|error| raise(error))
+    }
+}
+
 /// Runs a step; a [`raise`] inside becomes its error. True panics go on unwinding.
 pub fn attempt<T>(step: impl FnOnce() -> T) -> Result<T, StorageError> {
     match catch_unwind(AssertUnwindSafe(step)) {

@@ -1,9 +1,10 @@
-//! How a run is asked to end.
+//! A token that requests the end of a run.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Asks the runs it was given to, and no others, to end soon. Clones are the same token; [`CancelToken::reset`] makes it usable again.
+/// Requests the end of the runs that have this token. Clones are the same token; [`CancelToken::reset`] makes it usable
+/// again.
 ///
 /// ```
 /// # use tetdb_base::storage as tetdb;
@@ -20,17 +21,18 @@ pub struct CancelToken {
 }
 
 impl CancelToken {
-    /// A token nobody has cancelled.
+    /// A token that is not cancelled.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Asks the runs that have this token to end; each stops between two page accesses, at its last finished step.
+    /// Requests the end of the runs that have this token; each stops between two page accesses, at its last finished
+    /// step.
     pub fn cancel(&self) {
         self.wanted.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was cancelled since the last [`CancelToken::reset`].
+    /// Returns whether the token was cancelled since the last [`CancelToken::reset`].
     pub fn is_cancelled(&self) -> bool {
         self.wanted.load(Ordering::Relaxed)
     }

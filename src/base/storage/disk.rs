@@ -1,6 +1,6 @@
-//! The one door to the disk: whatever a store does with files and folders goes through a [`Disk`].
+//! The interface to the disk: all operations of a store on files and folders go through a [`Disk`].
 //!
-//! Why a door: what a crash, a full disk or a failing one leaves behind can only be tested on a disk that does these things on demand.
+//! Why: the state after a crash, on a full disk or on a failing one can be tested only on a disk that fails on demand.
 
 use std::fmt::Debug;
 use std::io::{self, Read, Write};
@@ -10,19 +10,20 @@ use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
 
 use super::file_lock::{FileLock, Refused};
 
-/// Files and folders by path. Paths mean what they mean to the operating system.
+/// Files and folders by path. Paths have the meaning of the operating system.
 ///
-/// What is written counts after [`StorageBackend::sync_data`] or [`Disk::sync_file`]; that a file has a name, another name or none, after
-/// [`Disk::sync_dir`]. Errors: the system's, with its kinds ([`io::ErrorKind::StorageFull`] and so on).
+/// Written bytes last after [`StorageBackend::sync_data`] or [`Disk::sync_file`]. Names of created, renamed and removed
+/// files last after [`Disk::sync_dir`]. Errors: the system's, with its kinds ([`io::ErrorKind::StorageFull`] and so
+/// on).
 pub trait Disk: Debug + Send + Sync {
     /// Creates a database file, which must not exist.
     fn create(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
     /// Opens a database file for reading and writing.
     fn open(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
-    /// Opens a database file for reading, whoever has it.
-    fn open_to_look(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
-    /// Opens the database in a file for reading, beside other readers: redb does so for real files only, by their paths. `None`: this disk
-    /// has none.
+    /// Opens a database file for reading, even while another process has it open.
+    fn open_read_only(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
+    /// Opens a database for reading together with other readers. redb can do so only for real files, by their paths.
+    /// `None`: this disk has none.
     fn open_shared(
         &self,
         path: &Path,
@@ -32,17 +33,17 @@ pub trait Disk: Debug + Send + Sync {
     fn create_stream(&self, path: &Path) -> io::Result<Box<dyn Write>>;
     /// Opens a file to be read once from its beginning.
     fn open_stream(&self, path: &Path) -> io::Result<Box<dyn Read + Send + Sync>>;
-    /// Makes the content of a closed file last.
+    /// Syncs the content of a closed file.
     fn sync_file(&self, path: &Path) -> io::Result<()>;
-    /// Makes names in a folder last: of files that were created, renamed and removed.
+    /// Syncs the names in a folder: of files that were created, renamed and removed.
     fn sync_dir(&self, dir: &Path) -> io::Result<()>;
-    /// Makes a folder. Errors: its parent is missing, or it is there already.
+    /// Creates a folder. Errors: its parent is missing, or it exists.
     fn create_dir(&self, dir: &Path) -> io::Result<()>;
     /// Removes a folder with all that is in it.
     fn remove_dir_all(&self, dir: &Path) -> io::Result<()>;
     /// Removes a file.
     fn remove_file(&self, path: &Path) -> io::Result<()>;
-    /// Gives a file another name on the same disk, replacing what had it.
+    /// Renames a file on the same disk, replacing a file of the new name.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
     /// Gives a file a second name on the same disk. Errors: there are none on this disk; the name is taken.
     fn link(&self, _from: &Path, _to: &Path) -> io::Result<()> {
@@ -52,18 +53,18 @@ pub trait Disk: Debug + Send + Sync {
     fn lock(&self, path: &Path) -> Result<FileLock, Refused>;
     /// Names in a folder, in any order.
     fn list(&self, dir: &Path) -> io::Result<Vec<String>>;
-    /// What is at a path; `None`: nothing, or nothing that may be seen.
-    fn entry(&self, path: &Path) -> Option<Entry>;
-    /// Which file has this name now; `None`: none.
+    /// The kind of the entry at a path; `None` if there is none or it may not be read.
+    fn entry(&self, path: &Path) -> Option<DiskEntry>;
+    /// Identity of the file at a path; `None` if there is none.
     fn id(&self, path: &Path) -> Option<FileId>;
 }
 
-/// Tells a file from any other that is there or open at the same time, whatever its name.
+/// Identifies a file among all that exist or are open at the same time, by any name.
 pub type FileId = (u64, u64);
 
-/// What has a name on a disk.
+/// The kind of a directory entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Entry {
+pub enum DiskEntry {
     /// A folder.
     Folder,
     /// A file of this many bytes.

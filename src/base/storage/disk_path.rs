@@ -1,11 +1,11 @@
-//! A place on a disk, and what a store does there.
+//! A path on a disk, and the operations of a store there.
 
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::StorageError;
-use super::disk::{Disk, Entry, FileId};
+use super::disk::{Disk, DiskEntry, FileId};
 use super::file_lock::{FileLock, Refused};
 use super::real_disk::RealDisk;
 
@@ -42,28 +42,28 @@ impl DiskPath {
     pub fn folder(&self) -> Self {
         let parent = match self.path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
-            // A bare name is in the current folder, and so is that folder itself as far as anybody asks.
+            // A bare name is in the current folder. The current folder counts as its own folder here.
             _ => Path::new("."),
         };
         Self::on(self.disk.clone(), parent)
     }
 
-    /// Whether something is there.
+    /// Returns whether a file or folder exists here.
     pub fn exists(&self) -> bool {
         self.disk.entry(&self.path).is_some()
     }
 
-    /// Whether a file is there.
+    /// Returns whether a file exists here.
     pub fn is_file(&self) -> bool {
-        matches!(self.disk.entry(&self.path), Some(Entry::File(_)))
+        matches!(self.disk.entry(&self.path), Some(DiskEntry::File(_)))
     }
 
-    /// Whether a folder is there.
+    /// Returns whether a folder exists here.
     pub fn is_dir(&self) -> bool {
-        self.disk.entry(&self.path) == Some(Entry::Folder)
+        self.disk.entry(&self.path) == Some(DiskEntry::Folder)
     }
 
-    /// Which file has this name now.
+    /// Identity of the file here.
     pub fn id(&self) -> Option<FileId> {
         self.disk.id(&self.path)
     }
@@ -73,15 +73,15 @@ impl DiskPath {
         self.disk.lock(&self.path)
     }
 
-    /// Length of the file in bytes. Errors: there is none.
+    /// Length of the file in bytes. Errors: there is no such file.
     pub fn bytes(&self) -> Result<u64, StorageError> {
         match self.disk.entry(&self.path) {
-            Some(Entry::File(bytes)) => Ok(bytes),
+            Some(DiskEntry::File(bytes)) => Ok(bytes),
             _ => self.at_path(Err(io::ErrorKind::NotFound.into())),
         }
     }
 
-    /// Makes the folder, and those above it that are missing, to last.
+    /// Creates the folder and its missing parents, durably.
     pub fn create_dir_all(&self) -> Result<(), StorageError> {
         self.at_path(self.create_dirs())
     }
@@ -109,13 +109,13 @@ impl DiskPath {
         self.at_path(self.disk.remove_dir_all(&self.path))
     }
 
-    /// Gives what is here another name in the same folder, to last.
+    /// Renames the file or folder within its folder, durably.
     pub fn rename(&self, to: &Self) -> Result<(), StorageError> {
         to.at_path(self.disk.rename(&self.path, &to.path))?;
         to.folder().sync_dir()
     }
 
-    /// Gives what is here a second name. Errors: this disk has none; the name is taken.
+    /// Adds a second name. Errors: the disk does not support it; the name exists.
     pub fn link(&self, to: &Self) -> Result<(), StorageError> {
         to.at_path(self.disk.link(&self.path, &to.path))
     }
@@ -128,12 +128,12 @@ impl DiskPath {
         }
     }
 
-    /// Makes the content of the closed file last.
+    /// Syncs the content of the closed file.
     pub fn sync_file(&self) -> Result<(), StorageError> {
         self.at_path(self.disk.sync_file(&self.path))
     }
 
-    /// Makes the names in the folder last.
+    /// Syncs the names in the folder.
     pub fn sync_dir(&self) -> Result<(), StorageError> {
         self.at_path(self.disk.sync_dir(&self.path))
     }
@@ -143,7 +143,7 @@ impl DiskPath {
         self.at_path(self.disk.list(&self.path))
     }
 
-    /// What was done here, with the path in its error.
+    /// The result of an operation here, with the path in its error.
     pub(super) fn at_path<T>(&self, done: io::Result<T>) -> Result<T, StorageError> {
         done.map_err(|e| StorageError::io(&self.path, e))
     }

@@ -1,4 +1,4 @@
-//! Changes of one's own over pages that several threads read.
+//! Private changes over pages that several threads read.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use tetdb_schema::page::{NONE, SLOT_BITS, Slot, u32_le};
 
 use super::pages::{Pages, SharedPages, kind};
 
-/// Shared pages with changes that nobody else sees, and a list of the tetrahedra that were read.
+/// Shared pages with private changes, and a list of the tetrahedra that were read.
 ///
 /// Is not: for many changes. Each access looks among them first, when there are any.
 pub struct DraftPages<'a> {
@@ -16,12 +16,12 @@ pub struct DraftPages<'a> {
     /// Pages appended to each kind.
     appended: [u32; kind::ALL.len()],
     met: Vec<u32>,
-    /// Tetrahedra met last, each at a place its id says.
+    /// Tetrahedra met last, each in the slot of its id.
     met_last: Vec<u32>,
 }
 
 const ZERO: Slot = [u32_le::from_native(0); 8];
-/// Places of those met last: most of what is read again is among them.
+/// Slots for the ids read last: most repeated reads are among them.
 const PLACES: usize = 1 << 10;
 
 impl<'a> DraftPages<'a> {
@@ -36,7 +36,7 @@ impl<'a> DraftPages<'a> {
         }
     }
 
-    /// Forgets changes and what was read.
+    /// Drops all changes and the list of reads.
     pub fn restart(&mut self) {
         self.changed.clear();
         self.appended = [0; kind::ALL.len()];
@@ -54,7 +54,7 @@ impl<'a> DraftPages<'a> {
         self.base
     }
 
-    /// Whether all records are what they were.
+    /// Returns whether all records are unchanged.
     pub fn is_unchanged(&self) -> bool {
         self.changed.iter().all(|(&(kind, id), slot)| {
             let base = &self.base;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::page::PageError;
 use thiserror::Error;
 
-/// What can go wrong between memory and disk.
+/// A failure between memory and disk.
 #[derive(Debug, Error)]
 pub enum StorageError {
     /// The operating system or redb refused a read or write.
@@ -12,7 +12,7 @@ pub enum StorageError {
     Database {
         /// The file or folder.
         path: PathBuf,
-        /// What the cause was.
+        /// The cause.
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
@@ -22,7 +22,7 @@ pub enum StorageError {
         /// The file or folder.
         path: PathBuf,
     },
-    /// The disk has no room for what must be written.
+    /// The disk is full.
     #[error("no space left to write {path}")]
     Full {
         /// The file or folder.
@@ -33,15 +33,15 @@ pub enum StorageError {
     Damaged {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The damage found.
         reason: String,
     },
-    /// A page is not what its address says.
+    /// A page does not match its address.
     #[error("{path} is damaged: {source}")]
     Page {
         /// The file or folder.
         path: PathBuf,
-        /// What the cause was.
+        /// The cause.
         #[source]
         source: PageError,
     },
@@ -50,7 +50,7 @@ pub enum StorageError {
     Missing {
         /// The file or folder.
         path: PathBuf,
-        /// What should be there.
+        /// The missing page or file.
         what: String,
     },
     /// A file operation outside redb failed.
@@ -58,16 +58,16 @@ pub enum StorageError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the cause was.
+        /// The cause.
         #[source]
         source: std::io::Error,
     },
     /// The ledger has no bytes left for a demand.
     #[error("{what} needs {needed} bytes, the memory budget has {available} left")]
     Budget {
-        /// What needs the bytes.
+        /// The purpose of the bytes.
         what: &'static str,
-        /// Bytes asked for.
+        /// Bytes requested.
         needed: u64,
         /// Bytes left.
         available: u64,
@@ -75,7 +75,7 @@ pub enum StorageError {
     /// The system refuses the memory for an array.
     #[error("the system refuses {bytes} bytes of memory")]
     NoMemory {
-        /// Bytes asked for.
+        /// Bytes requested.
         bytes: u64,
     },
     /// More records than 30-bit ids can name.
@@ -84,13 +84,13 @@ pub enum StorageError {
         /// Kind of the records.
         what: &'static str,
     },
-    /// The user asked to stop; the step in flight is lost, everything before it is kept.
+    /// The user asked to stop. The current step is lost; all steps before it are kept.
     #[error("the run was ended before it was done")]
     Cancelled,
 }
 
 impl StorageError {
-    /// Whether what is on disk is not what was written.
+    /// Returns whether the bytes on disk differ from those written.
     pub fn is_damage(&self) -> bool {
         matches!(self, Self::Damaged { .. } | Self::Page { .. } | Self::Missing { .. })
     }

@@ -10,7 +10,7 @@ use redb::{
     StorageBackend, TableDefinition,
 };
 
-use super::backend::{Private, Synced, Unsynced};
+use super::backend::{DiskFile, Private};
 use super::{DiskPath, StorageError};
 
 /// A check goes through a file once, so that a cache brings nothing.
@@ -27,15 +27,15 @@ enum Handle {
 
 /// Values by key in one redb file.
 ///
-/// Invariant: every write is one commit, durable but in a file from [`StoreFile::create_unsynced`]. Is not: a cache of its own; redb's is
-/// bounded by the `cache_bytes` given at opening, which the caller has leased.
+/// Invariant: every write is one commit. It is durable, except in a file from [`StoreFile::create_unsynced`]. Is not: a
+/// cache. The cache is redb's and is bounded by the `cache_bytes` given at opening, which the caller has leased.
 pub struct StoreFile {
     path: DiskPath,
     /// Always there until it is dropped.
     handle: Option<Handle>,
     /// Kept between reads; dropped at each commit, because it shows the state before it.
     table: Option<ReadOnlyTable<u64, &'static [u8]>>,
-    /// What was found damaged: redb answers all further reads with an error that says nothing.
+    /// The damage found first. Afterwards redb answers all reads with an error that names no cause.
     damage: Option<String>,
 }
 
@@ -44,28 +44,25 @@ impl StoreFile {
     ///
     /// Errors: [`StorageError::Io`] when it exists or its folder cannot be written.
     pub fn create(path: impl Into<DiskPath>, cache_bytes: usize) -> Result<Self, StorageError> {
-        Self::fresh(path.into(), cache_bytes, Synced)
+        Self::fresh(path.into(), cache_bytes, true)
     }
 
-    /// Creates a file that must not exist, for one process, and does not sync its commits: who lists it in the catalog syncs it.
+    /// Creates a file that must not exist, for one process. Commits are not synced: the file is synced when the catalog
+    /// lists it.
     ///
     /// Errors: as [`StoreFile::create`].
     pub fn create_unsynced(
         path: impl Into<DiskPath>,
         cache_bytes: usize,
     ) -> Result<Self, StorageError> {
-        Self::fresh(path.into(), cache_bytes, Unsynced)
+        Self::fresh(path.into(), cache_bytes, false)
     }
 
-    fn fresh<B: StorageBackend>(
-        path: DiskPath,
-        cache_bytes: usize,
-        backend: fn(Box<dyn StorageBackend>) -> B,
-    ) -> Result<Self, StorageError> {
+    fn fresh(path: DiskPath, cache_bytes: usize, is_synced: bool) -> Result<Self, StorageError> {
         let mut builder = Database::builder();
         builder.set_cache_size(cache_bytes);
         let file = path.at_path(path.disk().create(path.path()))?;
-        let db = guarded(|| builder.create_with_backend(backend(file)));
+        let db = guarded(|| builder.create_with_backend(DiskFile { file, is_synced }));
         let mut file = Self {
             handle: Some(Handle::Writer(Arc::new(db.map_err(|e| e.at(path.path()))?))),
             path,
@@ -109,8 +106,8 @@ impl StoreFile {
             table: None,
             damage: None,
         };
-        // redb writes once more when it closes what it opened for writing. On a damaged tree it panics meanwhile, and again in what that
-        // unwinds, which ends the process: so a damaged file is never closed.
+        // redb writes once more when it closes a database opened for writing. On a damaged tree it panics then, and
+        // panics again while unwinding, which ends the process. So a damaged file is never closed.
         if matches!(file.handle, Some(Handle::Writer(_)))
             && let Err(damage) = file.check()
         {
@@ -141,7 +138,7 @@ impl StoreFile {
         }
     }
 
-    /// Gives the file another name in its folder, to last, replacing what had it; readers see the old name or the new.
+    /// Renames the file within its folder, durably, replacing a file of that name; readers see the old name or the new.
     ///
     /// Errors: the system refuses.
     pub fn rename(&mut self, name: &str) -> Result<(), StorageError> {
@@ -151,7 +148,7 @@ impl StoreFile {
         Ok(())
     }
 
-    /// Where the file is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         self.path.path()
     }
@@ -188,11 +185,11 @@ impl StoreFile {
         done.map_err(|e| self.failed(e))
     }
 
-    /// What a read that failed means: behind damage that was found, redb's refusal to go on is that damage.
-    fn failed(&mut self, failure: Failure) -> StorageError {
+    /// The error of a failed read. Once damage was found, redb refuses all reads; the error is then that damage.
+    fn failed(&mut self, failure: RedbFailure) -> StorageError {
         let path = self.path.path();
         match (failure, &self.damage) {
-            (Failure::Error(redb::Error::PreviousIo), Some(reason)) => {
+            (RedbFailure::Error(redb::Error::PreviousIo), Some(reason)) => {
                 StorageError::Damaged { path: path.to_owned(), reason: reason.clone() }
             }
             (failure, _) => {
@@ -245,8 +242,8 @@ impl StoreFile {
         committed.map_err(|e| e.at(self.path.path()))
     }
 
-    /// Reads the whole file and compares every page of redb's tree with its checksum, which nothing else does: what is read by key is right or
-    /// missing, but a range of keys may silently lack some.
+    /// Reads the whole file and compares every page of redb's tree with its checksum. Nothing else does: a value read
+    /// by key is right or missing, but a range of keys may silently lack some.
     ///
     /// Effects: none on the file. Errors: [`StorageError::Damaged`].
     pub fn check(&self) -> Result<(), StorageError> {
@@ -271,7 +268,7 @@ impl StoreFile {
         }
     }
 
-    /// The same file for another reader, as it was when this one opened it.
+    /// A handle for another reader, with the state that this handle shows.
     pub fn share(&self) -> Self {
         Self {
             path: self.path.clone(),
@@ -312,7 +309,7 @@ impl StoreFile {
         to.sync_file()
     }
 
-    /// Shrinks the file to what it holds, and closes it.
+    /// Shrinks the file to its content, and closes it.
     pub fn compact(mut self) -> Result<(), StorageError> {
         self.table = None;
         if let Some(Handle::Writer(db)) = &mut self.handle {
@@ -342,32 +339,33 @@ impl Drop for StoreFile {
     fn drop(&mut self) {
         self.table = None;
         let handle = self.handle.take();
-        // redb looks at its tree once more when it closes. What it may find was reported already, or is found by who opens the file next.
+        // redb checks its tree once more when it closes. Damage found there was reported before, or is found when the
+        // file is opened next.
         let _ = caught(|| drop(handle));
     }
 }
 
-/// For what a file is opened.
+/// The purpose of opening a file.
 #[derive(Clone, Copy)]
 enum Access {
-    /// To be changed, by nobody else.
+    /// For writing, exclusively.
     Write,
-    /// To be read, beside other readers.
+    /// For reading, shared with other readers.
     Share,
-    /// To be read, with what redb changes kept in memory.
+    /// For reading, with redb's changes kept in memory.
     Private,
 }
 
-/// Opens what is there; an empty file is none of redb's, which would begin a database in it.
+/// Opens an existing file. An empty file is refused: redb would create a database in it.
 fn open_writable(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
     let file = path.disk().open(path.path()).map_err(redb::StorageError::Io)?;
     refuse_empty(&*file)?;
-    builder.create_with_backend(Synced(file))
+    builder.create_with_backend(DiskFile { file, is_synced: true })
 }
 
-/// Opens what is there, changing nothing.
+/// Opens an existing file without changing it.
 fn open_private(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
-    let file = path.disk().open_to_look(path.path());
+    let file = path.disk().open_read_only(path.path());
     let file = file.map_err(redb::StorageError::Io)?;
     refuse_empty(&*file)?;
     builder.create_with_backend(Private::new(file).map_err(redb::StorageError::Io)?)
@@ -381,12 +379,12 @@ fn refuse_empty(file: &dyn StorageBackend) -> Result<(), redb::StorageError> {
 }
 
 /// A failure inside redb: an error it returned, or a panic on a tree it could not follow.
-enum Failure {
+enum RedbFailure {
     Error(redb::Error),
     Panic(String),
 }
 
-impl Failure {
+impl RedbFailure {
     fn at(self, path: &Path) -> StorageError {
         let path = path.to_owned();
         match self {
@@ -396,7 +394,7 @@ impl Failure {
             Self::Error(redb::Error::Io(e)) if e.kind() == ErrorKind::NotFound => {
                 StorageError::Missing { path, what: "the file".to_owned() }
             }
-            // A foreign, cut or empty file: redb finds no header of its own, or not the pages it names.
+            // A foreign, truncated or empty file: redb does not find its header or its pages.
             Self::Error(redb::Error::Io(e))
                 if matches!(e.kind(), ErrorKind::InvalidData | ErrorKind::UnexpectedEof) =>
             {
@@ -417,11 +415,11 @@ impl Failure {
     }
 }
 
-/// Runs a call into redb and makes what it returns one kind of failure.
-fn guarded<T, E: Into<redb::Error>>(call: impl FnOnce() -> Result<T, E>) -> Result<T, Failure> {
+/// Calls redb and converts its failures to one type.
+fn guarded<T, E: Into<redb::Error>>(call: impl FnOnce() -> Result<T, E>) -> Result<T, RedbFailure> {
     match caught(call) {
-        Ok(result) => result.map_err(|e| Failure::Error(e.into())),
-        Err(reason) => Err(Failure::Panic(reason)),
+        Ok(result) => result.map_err(|e| RedbFailure::Error(e.into())),
+        Err(reason) => Err(RedbFailure::Panic(reason)),
     }
 }
 
@@ -463,7 +461,7 @@ mod tests {
         Ok(())
     }
 
-    /// Of a damaged tree every read says that it is damaged, not only the first one.
+    /// Every read of a damaged tree reports the damage, not only the first one.
     #[test]
     fn damage_stays_damage() -> Result<(), Box<dyn std::error::Error>> {
         let dir = tempfile::tempdir()?;

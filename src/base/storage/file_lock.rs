@@ -1,11 +1,12 @@
-//! A file that stands for a right only one process has at a time.
+//! A lock file: one process at a time holds it.
 //!
-//! The system's lock on the file decides, and ends with the process, however that ends. On a file system that knows no locks the file itself
-//! decides: whoever creates it has the right, and one that a process of this host left behind when it died is taken over. The file says
-//! who has it, for the message to others.
+//! The system's lock on the file decides; it ends with the process. On a file system without locks, the existence of
+//! the file decides: the process that creates the file holds the lock. A file left by a dead process of this host is
+//! taken over. The file names its holder, for messages to other processes.
 //!
-//! There are file systems of clusters where every machine gets the lock it asks for. So a file that is not new is looked at even by who has
-//! its lock: a process of this host that it names and that lives has the right, and so has one of another host while it renews the file.
+//! On some cluster file systems every machine gets the lock it requests. So a process that gets the lock on an existing
+//! file still reads it: a living process of this host that the file names holds the lock, and so does a process of
+//! another host while it renews the file.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Read, Seek, Write};
@@ -20,12 +21,14 @@ use serde::{Deserialize, Serialize};
 
 /// Others that come and go with their file while it is opened; each costs one attempt.
 const ATTEMPTS: u32 = 100;
-/// Without locks two may take over a dead process's file at once: after this time the file says which of them has it.
+/// Without locks two processes may take over a dead process's file at once: after this time the file names the one that
+/// has it.
 const SETTLED_AFTER: Duration = Duration::from_millis(200);
 
 /// Between two times that a holder renews its file.
 const RENEWED_EVERY: Duration = Duration::from_millis(500);
-/// A holder on another host that has not renewed its file for so long is gone: six times what it takes, so that a slow disk is no death.
+/// A holder on another host that has not renewed its file for this long is considered gone: six renewal intervals, so
+/// that a slow disk does not count as death.
 const RENEWED_WITHIN: Duration = Duration::from_secs(3);
 
 /// A right that is held; it ends when this is dropped.
@@ -38,16 +41,16 @@ pub struct FileLock {
     is_by_name: bool,
 }
 
-/// Why the right is not given.
+/// Reasons to refuse the lock.
 #[derive(Debug)]
 pub enum Refused {
-    /// Another has it; in words who, as far as the file says.
+    /// Another process holds the lock; its description, as far as the file gives one.
     Held(String),
     /// The system does not let the file be created or read.
     Io(io::Error),
 }
 
-/// What the file says.
+/// The content of the file.
 #[derive(Debug, Serialize, Deserialize)]
 struct Holder {
     host: String,
@@ -56,7 +59,7 @@ struct Holder {
     time: u64,
     /// Differs between any two that are taken on one host.
     run: String,
-    /// When the process began, in the system's own ticks: its number may be another's later. 0: unknown.
+    /// Start time of the process, in the system's ticks: a later process may have the same number. 0: unknown.
     #[serde(default)]
     began: u64,
 }
@@ -74,7 +77,7 @@ impl Renewed {
         // The file, and with it its lock, is closed when the thread ends.
         let renew = move || {
             while stopped.recv_timeout(RENEWED_EVERY) == Err(RecvTimeoutError::Timeout) {
-                // Who cannot say that it lives still does.
+                // A failure to renew does not end the lock.
                 let _ = file.set_modified(SystemTime::now());
             }
         };
@@ -92,7 +95,7 @@ impl Drop for Renewed {
 }
 
 impl FileLock {
-    /// One that nobody else asks for, such as on a disk in memory.
+    /// A lock that no other process requests, for example on a disk in memory.
     pub fn unshared() -> Self {
         Self { held: None, path: Mutex::default(), text: String::new(), is_by_name: false }
     }
@@ -139,7 +142,8 @@ impl FileLock {
             if is_taken_over {
                 std::thread::sleep(SETTLED_AFTER);
             }
-            // Whoever had it may have removed the file meanwhile: then this one has no name, and another may be locked in its place.
+            // The previous holder may have removed the file meanwhile. Then this one has no name, and another process
+            // may lock a new one.
             if fs::read_to_string(path).is_ok_and(|found| found == text) {
                 return Ok(Self {
                     held: Some(Renewed::new(file)),
@@ -152,7 +156,7 @@ impl FileLock {
         Err(Refused::Held(holder(path)))
     }
 
-    /// Whether the file alone decides, because its file system knows no locks.
+    /// Returns whether the file alone decides, because its file system has no locks.
     pub fn is_by_name(&self) -> bool {
         self.is_by_name
     }
@@ -166,7 +170,7 @@ impl FileLock {
 impl Drop for FileLock {
     fn drop(&mut self) {
         let path = self.path.lock().unwrap_or_else(PoisonError::into_inner);
-        // While it is held nobody else writes the file; what says something else is another's.
+        // While the lock is held no other process writes the file; a file with another text belongs to another process.
         if self.held.is_some() && fs::read_to_string(&*path).is_ok_and(|found| found == self.text) {
             let _ = remove(&path);
         }
@@ -203,7 +207,7 @@ fn remove(path: &Path) -> io::Result<()> {
 }
 
 fn knows_no_locks(error: &io::Error) -> bool {
-    /// What Linux says where there is no lock manager, no such call, or no support: ENOLCK, ENOSYS, EOPNOTSUPP.
+    /// Error numbers of Linux without a lock manager, the call or its support: ENOLCK, ENOSYS, EOPNOTSUPP.
     const NUMBERS: [i32; 3] = [37, 38, 95];
     let number = error.raw_os_error();
     error.kind() == ErrorKind::Unsupported || number.is_some_and(|n| NUMBERS.contains(&n))
@@ -224,7 +228,7 @@ impl Holder {
         }
     }
 
-    /// Whether it says so by itself: as a process of this host, or by renewing its file.
+    /// Returns whether the holder proves to be alive: as a process of this host, or by renewing its file.
     fn lives(&self, path: &Path) -> bool {
         if self.host == host_name() {
             return self.began != 0 && self.began == began(self.process);
@@ -252,17 +256,17 @@ impl Holder {
     }
 }
 
-/// Whether a file that was there before, and whose lock nobody has, belongs to somebody.
+/// Returns whether an existing file, whose lock is free, still belongs to a living process.
 fn is_held_all_the_same(path: &Path) -> bool {
     let Some(holder) = Holder::read(path) else {
-        // Somebody who created it just now is about to write; who died before that never will.
+        // A process that has just created the file will write it soon; one that died before writing never will.
         std::thread::sleep(SETTLED_AFTER);
         return Holder::read(path).is_some_and(|holder| holder.lives(path));
     };
     holder.lives(path)
 }
 
-/// When a process of this host began; 0 where the system does not say.
+/// Start time of a process of this host; 0 if the system does not report it.
 fn began(process: u32) -> u64 {
     /// Place of the number in the line, counted behind the name, which may hold anything.
     const BEGAN: usize = 19;
@@ -272,7 +276,7 @@ fn began(process: u32) -> u64 {
     number.and_then(|n| n.parse().ok()).unwrap_or(0)
 }
 
-/// Whether the process that left the file may still be there: of another host nobody knows.
+/// Returns whether the process that left the file may still run; processes of other hosts may.
 fn may_live(path: &Path) -> bool {
     let Some(holder) = Holder::read(path) else {
         return true;
@@ -287,7 +291,7 @@ fn holder(path: &Path) -> String {
     }
 }
 
-/// Whether a process is known to have ended: of another host nobody knows.
+/// Returns whether a process has certainly ended; for processes of other hosts this is unknown.
 pub fn is_process_gone(host: &str, process: u32) -> bool {
     let processes = Path::new("/proc");
     host == host_name()

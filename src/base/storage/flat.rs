@@ -2,7 +2,7 @@ use tetdb_schema::page::{SLOTS, Slot, u32_le};
 
 use super::{Pages, kind};
 
-/// The same accessors over plain arrays, without a cap: what paging is measured against.
+/// The accessors of [`Pages`] over plain arrays, without a cap: the baseline for measuring the cost of paging.
 #[derive(Clone, Default)]
 pub struct FlatPages {
     arrays: [Vec<Slot>; kind::ALL.len()],

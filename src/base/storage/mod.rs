@@ -1,11 +1,11 @@
-//! Pages, cache, budget, transactions. This module knows bytes and records, not geometry.
+//! Pages, cache, budget, transactions. The module handles bytes and records, not geometry.
 //!
 //! # How failure travels
-//! A record is read some twenty million times a second, and nearly always from a resident frame. The
-//! accessors of [`Pages`] therefore return records, not results: when a page cannot be loaded, the
-//! pager unwinds with the [`StorageError`] as its payload, and [`attempt`], which surrounds each step,
-//! turns that back into a value. A step is atomic, so what it leaves half-done in memory is dropped
-//! with it. Nothing but [`attempt`] may catch such an unwinding. A request to stop travels the same way.
+//! A record is read some twenty million times a second, and nearly always from a resident frame. The accessors of
+//! [`Pages`] therefore return records, not results. If a page cannot be loaded, the pager unwinds with the
+//! [`StorageError`] as its payload; [`attempt`], which surrounds each step, turns that back into a value. A step is
+//! atomic, so its unfinished state in memory is dropped with it. Nothing but [`attempt`] may catch such an unwinding. A
+//! request to stop travels the same way.
 
 #![warn(missing_docs)]
 
@@ -20,12 +20,13 @@ mod error;
 mod file;
 mod file_lock;
 mod flat;
+mod free_space;
+mod page_files;
 mod page_table;
 mod paged_vec;
 mod pager;
 mod pages;
 mod parallel_sort;
-mod places;
 mod real_disk;
 mod remote;
 mod reserve;
@@ -33,24 +34,24 @@ mod run_context;
 mod scratch;
 mod sort;
 mod sort_record;
-mod space;
 mod spill;
 mod spill_vec;
 
 pub use budget::{Budget, Lease};
-pub use cancel::{attempt, check_cancelled, raise};
+pub use cancel::{OrRaise, attempt, check_cancelled, raise};
 pub use cancel_token::CancelToken;
-pub use disk::{Disk, Entry, FileId};
+pub use disk::{Disk, DiskEntry, FileId};
 pub use disk_path::DiskPath;
 pub use draft_pages::DraftPages;
 pub use error::StorageError;
 pub use file::StoreFile;
 pub use file_lock::{FileLock, Refused, host_name, is_process_gone};
 pub use flat::FlatPages;
+pub use free_space::available_bytes;
+pub use page_files::Backing;
 pub use pager::{Pager, PagerStats};
 pub use pages::{Pages, SharedPages, kind};
 pub use parallel_sort::sort_unstable_by;
-pub use places::Backing;
 pub use remote::RemoteFailure;
 pub use reserve::{filled, push, reserve};
 pub use run_context::{
@@ -59,6 +60,5 @@ pub use run_context::{
 };
 pub use sort::{Sorted, Sorter};
 pub use sort_record::sort_record;
-pub use sort_record::{Keyed, Payload, SortBytes, SortField, SortRecord, total_order};
-pub use space::available_bytes;
+pub use sort_record::{KeyedId, Payload, SortBytes, SortField, SortRecord, total_order};
 pub use spill_vec::{FrozenSpillVec, ScratchSpace, SpillVec, SpillVecBuilder};

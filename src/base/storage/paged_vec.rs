@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bytemuck::Pod;
 
 use super::scratch::ScratchFile;
-use super::{DiskPath, Lease, check_cancelled, raise, reserve};
+use super::{DiskPath, Lease, OrRaise, check_cancelled, reserve};
 
-/// Bytes of a page: small, for what is near in an array is near in space only mostly.
+/// Bytes of a page. Pages are small, because neighbors in an array are only mostly neighbors in space.
 pub(super) const PAGE_BYTES: usize = 1 << 14;
 /// Frames a paged array has at least: sweeps along a space-filling curve touch some dozens of pages at a time.
 pub(super) const FRAMES_MIN: usize = 32;
@@ -90,7 +90,7 @@ impl<T: Pod> PagedVec<T> {
     const PER: usize = per_page::<T>();
 
     pub fn new(dir: &DiskPath, initial: T, frames_max: usize) -> Self {
-        let file = ScratchFile::create(dir).unwrap_or_else(|e| raise(e));
+        let file = ScratchFile::create(dir).or_raise();
         Self::over(Arc::new(file), initial, frames_max)
     }
 
@@ -160,9 +160,7 @@ impl<T: Pod> PagedVec<T> {
         if self.table[page] & STORED != 0 {
             let at = self.offset(page);
             let bytes = bytemuck::cast_slice_mut(&mut self.frames[range]);
-            if let Err(e) = self.file.read(at, bytes) {
-                raise(e);
-            }
+            self.file.read(at, bytes).or_raise();
         } else {
             self.frames[range].fill(self.initial);
         }
@@ -206,9 +204,7 @@ impl<T: Pod> PagedVec<T> {
         }
         let at = self.offset(page as usize);
         let records = &self.frames[frame * Self::PER..(frame + 1) * Self::PER];
-        if let Err(e) = self.file.write(at, bytemuck::cast_slice(records)) {
-            raise(e);
-        }
+        self.file.write(at, bytemuck::cast_slice(records)).or_raise();
         self.pages[frame].1 &= !DIRTY;
         self.table[page as usize] |= STORED;
     }

@@ -9,16 +9,16 @@
 use lru::LruCache;
 use tetdb_schema::page::{FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, u32_le};
 
+use super::page_files::{Backing, PageFiles};
 use super::page_table::{
     DIRTY, FRAMES_LIMIT, IN_BASE, IN_OUTPUT, PageTable, REFERENCED, RESIDENT, frame_of,
 };
-use super::places::{Backing, Places};
-use super::{DiskPath, Pages, SharedPages, StorageError, check_cancelled, kind, raise};
+use super::{DiskPath, OrRaise, Pages, SharedPages, StorageError, check_cancelled, kind, raise};
 
-/// Dirty pages written in one commit; a quarter of what redb's cache should hold.
+/// Dirty pages written in one commit; a quarter of redb's cache.
 const BATCH_PAGES_MAX: usize = 256;
 /// Owner of a frame that holds no page.
-const NOBODY: (u8, u32) = (u8::MAX, u32::MAX);
+const NO_OWNER: (u8, u32) = (u8::MAX, u32::MAX);
 const FRAMES_MIN: usize = 16;
 
 /// Page traffic so far.
@@ -52,10 +52,10 @@ pub struct Pager {
     tables: [PageTable; kind::ALL.len()],
     /// Number in the file of each kind's first page; grows when pages are dropped from the front.
     first: [u32; kind::ALL.len()],
-    /// Kind and page of each frame, or [`NOBODY`].
+    /// Kind and page of each frame, or [`NO_OWNER`].
     owners: Vec<(u8, u32)>,
     order: LruCache<u32, ()>,
-    places: Places,
+    files: PageFiles,
     stats: PagerStats,
 }
 
@@ -82,12 +82,12 @@ impl Pager {
             first: Default::default(),
             owners: Vec::new(),
             order: LruCache::unbounded(),
-            places: Places::new(backing),
+            files: PageFiles::new(backing),
             stats: PagerStats::default(),
         }
     }
 
-    /// Uses no more than `bytes` for frames from now on, which must hold what it has; never more than it was created with.
+    /// Limits the frames to `bytes`, which must suffice for the frames in use and cannot exceed the initial size.
     pub fn limit(&mut self, bytes: u64) {
         let limit = frames_of(bytes).min(self.frames.len() / SLOTS);
         assert!(self.owners.len() <= limit, "more frames than it may use");
@@ -95,10 +95,10 @@ impl Pager {
     }
 
     /// [`Pager::limit`], and gives a pool that was created without one a place for pages that leave memory.
-    pub fn settle(&mut self, bytes: u64, backing: Backing) {
-        assert!(!self.places.exist(), "its pages would be in two places");
+    pub fn limit_with_backing(&mut self, bytes: u64, backing: Backing) {
+        assert!(!self.files.exist(), "its pages would be in two places");
         self.limit(bytes);
-        self.places = Places::new(Some(backing));
+        self.files = PageFiles::new(Some(backing));
     }
 
     /// Reads and writes so far.
@@ -111,7 +111,7 @@ impl Pager {
         self.owners.len()
     }
 
-    /// Declares what the base file holds: [`Pager::extents`] of the pager that wrote it.
+    /// Sets the pages of the base file: [`Pager::extents`] of the pager that wrote it.
     pub fn adopt(&mut self, extents: [[u32; 2]; kind::ALL.len()]) {
         for (kind, [first, n]) in extents.into_iter().enumerate() {
             self.first[kind] = first;
@@ -124,11 +124,11 @@ impl Pager {
         std::array::from_fn(|kind| [self.first[kind], self.tables[kind].len() as u32])
     }
 
-    /// Where a page is stored.
+    /// Address of a page.
     fn address(&self, kind: usize, page: u32) -> PageAddress {
         PageAddress {
             kind: kind::ALL[kind],
-            subdomain: self.places.subdomain(),
+            subdomain: self.files.subdomain(),
             page: self.first[kind] + page,
         }
     }
@@ -147,16 +147,16 @@ impl Pager {
 
     /// Ends a generation: writes all pages, wherever they are, to a file at `path` and goes on from it, as `generation`.
     ///
-    /// The file is closed when it is written: once it is listed it is not written to again, not even by redb when it is closed, for that would
-    /// not be synced, and a loss of power could leave it torn. Unwinds on errors.
+    /// The file is closed after writing: once the catalog lists it, it is never written again, not even by redb on
+    /// closing. Such a write would not be synced, and a loss of power could tear the file. Unwinds on errors.
     pub fn end_generation(&mut self, path: DiskPath, generation: u32) {
-        self.places.begin_file(path);
+        self.files.begin_file(path);
         assert_eq!(self.tables[kind::SCRATCH].len(), 0, "a map of this step");
         let n_batch = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX);
         let mut batch = Vec::with_capacity(n_batch);
         for kind in 0..self.tables.len() {
             for page in 0..self.tables[kind].len() as u32 {
-                // What had to make room is written already.
+                // Evicted pages are written already.
                 if self.tables[kind].entry(page) == IN_OUTPUT {
                     continue;
                 }
@@ -168,7 +168,7 @@ impl Pager {
             }
         }
         self.write_back(&batch);
-        or_raise(self.places.end_file(generation));
+        self.files.end_file(generation).or_raise();
         for table in &mut self.tables {
             for page in 0..table.len() as u32 {
                 if table.entry(page) & RESIDENT == 0 {
@@ -246,7 +246,7 @@ impl Pager {
         let address = self.address(kind, page);
         let at = frame as usize * SLOTS;
         let slots = &mut self.frames[at..at + SLOTS];
-        or_raise(self.places.read(place, address, slots));
+        self.files.read(place, address, slots).or_raise();
         self.stats.pages_read += 1;
         self.set_place(frame, place);
         self.owners[frame as usize] = (kind as u8, page);
@@ -254,14 +254,14 @@ impl Pager {
         frame | RESIDENT | REFERENCED
     }
 
-    /// A frame nobody owns: a free one, a fresh one, which is zero, or an evicted one.
+    /// A frame without a page: a free one, a fresh one (which is zero), or an evicted one.
     fn take_frame(&mut self) -> (u32, bool) {
         if let Some(frame) = self.free.pop() {
             return (frame, false);
         }
         if self.owners.len() < self.frames_max {
             let frame = self.owners.len() as u32;
-            self.owners.push(NOBODY);
+            self.owners.push(NO_OWNER);
             return (frame, true);
         }
         (self.evict(), false)
@@ -292,13 +292,13 @@ impl Pager {
         frame
     }
 
-    /// Whether the page in `frame` belongs to the output file.
+    /// Returns whether the page in `frame` belongs to the output file.
     fn is_output(&self, frame: u32) -> bool {
         let owner = self.owners[frame as usize];
-        owner != NOBODY && self.places.goes_to_output(usize::from(owner.0))
+        owner != NO_OWNER && self.files.goes_to_output(usize::from(owner.0))
     }
 
-    /// The next victims that would have to be written, so that one commit serves many misses.
+    /// The next eviction candidates that must be written, so that one commit serves many misses.
     fn cold_dirty_frames(&self) -> Vec<u32> {
         let n = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX - 1);
         let cold = self.order.iter().rev().map(|(&frame, ())| frame);
@@ -311,7 +311,7 @@ impl Pager {
 
     /// Writes a page to the spill.
     fn spill(&mut self, frame: u32) {
-        if !self.places.exist() {
+        if !self.files.exist() {
             raise(StorageError::Budget {
                 what: "a mesh without a store",
                 needed: (self.owners.len() as u64 + 1) * FRAME_BYTES as u64,
@@ -321,9 +321,9 @@ impl Pager {
         let (address, place) = (self.address_of(frame), self.place(frame));
         let at = frame as usize * SLOTS;
         let slots = &mut self.frames[at..at + SLOTS];
-        let place = or_raise(self.places.spill(place, address, slots));
+        let place = self.files.spill(place, address, slots).or_raise();
         self.stats.pages_written += 1;
-        self.is_at(frame, place);
+        self.mark_clean_at(frame, place);
     }
 
     /// Writes pages to the output file, in one commit.
@@ -331,7 +331,7 @@ impl Pager {
         for &frame in batch {
             let address = self.address_of(frame);
             let at = frame as usize * SLOTS;
-            self.places.seal(address, &mut self.frames[at..at + SLOTS]);
+            self.files.seal(address, &mut self.frames[at..at + SLOTS]);
         }
         let addresses: Vec<PageAddress> = batch.iter().map(|&f| self.address_of(f)).collect();
         let frames = &self.frames;
@@ -339,22 +339,22 @@ impl Pager {
             let at = frame as usize * SLOTS;
             (address, &frames[at..at + SLOTS])
         });
-        or_raise(self.places.write(pages));
+        self.files.write(pages).or_raise();
         self.stats.pages_written += batch.len() as u64;
         self.stats.commits += 1;
         for &frame in batch {
-            self.is_at(frame, IN_OUTPUT);
+            self.mark_clean_at(frame, IN_OUTPUT);
         }
     }
 
-    /// Where the page in `frame` is stored.
+    /// Address of the page in `frame`.
     fn address_of(&self, frame: u32) -> PageAddress {
         let (kind, page) = self.owners[frame as usize];
         self.address(usize::from(kind), page)
     }
 
     /// The page in `frame` is at `place` as it is.
-    fn is_at(&mut self, frame: u32, place: u32) {
+    fn mark_clean_at(&mut self, frame: u32, place: u32) {
         self.set_entry(frame, self.entry(frame) & !DIRTY);
         self.set_place(frame, place);
     }
@@ -440,7 +440,7 @@ impl Pages for Pager {
 
     fn shared(&mut self) -> Option<SharedPages<'_>> {
         let mut all = self.tables.iter_mut().all(PageTable::make_readable);
-        if !all && self.bring_in() {
+        if !all && self.load_all() {
             all = self.tables.iter_mut().all(PageTable::make_readable);
         }
         all.then(|| SharedPages::new(&self.frames, &self.tables))
@@ -448,8 +448,9 @@ impl Pages for Pager {
 }
 
 impl Pager {
-    /// Reads what is not in memory, such as what a mesh opened from its file has not asked for yet; `false` where there are not frames for all pages.
-    fn bring_in(&mut self) -> bool {
+    /// Loads all pages that are not in memory, such as pages of a newly opened mesh. `false` if there are too few
+    /// frames.
+    fn load_all(&mut self) -> bool {
         let pages: usize = self.tables.iter().map(PageTable::len).sum();
         if pages > self.frames_max {
             return false;
@@ -464,11 +465,11 @@ impl Pager {
 
     /// Leaves the places of the first `n` pages of a kind in the spill to others.
     fn forget(&mut self, kind: usize, n: u32) {
-        assert!(!self.places.goes_to_output(kind), "written once, and kept");
+        assert!(!self.files.goes_to_output(kind), "written once, and kept");
         for page in 0..n {
             let entry = self.tables[kind].entry(page);
             let place = frame_of(entry).map_or(entry, |frame| self.place(frame));
-            self.places.forget(place);
+            self.files.forget(place);
         }
     }
 
@@ -476,15 +477,10 @@ impl Pager {
     fn release(&mut self, frames: Vec<u32>) {
         for frame in frames {
             self.order.pop(&frame);
-            self.owners[frame as usize] = NOBODY;
+            self.owners[frame as usize] = NO_OWNER;
             self.free.push(frame);
         }
     }
-}
-
-/// What was done with a file. Unwinds on errors.
-fn or_raise<T>(done: Result<T, StorageError>) -> T {
-    done.unwrap_or_else(|error| raise(error))
 }
 
 #[cfg(test)]
@@ -504,7 +500,7 @@ mod tests {
         }
     }
 
-    /// Of a mesh opened from its file, threads may look at pages nobody has asked for yet, where all find room.
+    /// Threads may read all pages of a mesh opened from its file, if all pages fit.
     #[test]
     fn pages_of_a_file_are_shared_where_they_fit() -> Result<(), Box<dyn std::error::Error>> {
         const N: u32 = 24;
@@ -514,7 +510,7 @@ mod tests {
             subdomain: 0,
             generation,
             spill: dir.path().into(),
-            made: None,
+            output: None,
             base,
             cache_bytes: 1 << 20,
         };
@@ -551,7 +547,7 @@ mod tests {
             subdomain: 0,
             generation: 1,
             spill: dir.path().into(),
-            made: None,
+            output: None,
             base: None,
             cache_bytes: 1 << 20,
         };
@@ -566,7 +562,7 @@ mod tests {
                 pager.append_page::<{ kind::SCRATCH }>();
             }
             pager.clear::<{ kind::SCRATCH }>();
-            assert!((1..=2 * N + N / 2).contains(&pager.places.spilled()));
+            assert!((1..=2 * N + N / 2).contains(&pager.files.spilled()));
         }
         pager.end_generation(path.clone().into(), 2);
         let kept = std::fs::metadata(&path)?.len();

@@ -1,6 +1,6 @@
-//! Records by kind and id, whatever holds their pages.
+//! Records by kind and id, on any storage of their pages.
 
-use tetdb_schema::page::Slot;
+use tetdb_schema::page::{SLOT_BITS, Slot};
 
 use super::page_table::PageTable;
 
@@ -20,7 +20,7 @@ pub mod kind {
     pub const FACETS: usize = 4;
     /// Faces shared with other sub-domains.
     pub const INTERFACE_FACES: usize = 5;
-    /// A map for a step's own use; it is never stored in a result.
+    /// A scratch map of one step; it is never stored in a result.
     pub const SCRATCH: usize = 6;
     /// The page kinds in that order.
     pub const ALL: [PageKind; 7] = [
@@ -34,7 +34,7 @@ pub mod kind {
     ];
 }
 
-/// Random access to records by id, whatever holds them.
+/// Random access to records by id.
 ///
 /// The borrow ends before the next access: no reference into a page survives it.
 pub trait Pages {
@@ -48,6 +48,13 @@ pub trait Pages {
     fn n_pages<const K: usize>(&self) -> u32;
     /// Appends a zeroed page of kind `K` and returns its number.
     fn append_page<const K: usize>(&mut self) -> u32;
+    /// Appends zeroed pages of kind `K` until one has record `id`.
+    #[inline(always)]
+    fn append_up_to<const K: usize>(&mut self, id: u32) {
+        while id >> SLOT_BITS >= self.n_pages::<K>() {
+            self.append_page::<K>();
+        }
+    }
     /// Forgets the first `n` pages of kind `K`; the others move up to take their numbers.
     fn drop_front<const K: usize>(&mut self, n: u32);
     /// Forgets all pages of kind `K`, as if there had never been one.

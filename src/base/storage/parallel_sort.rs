@@ -1,4 +1,4 @@
-//! Sorting in memory, on all threads of the run that are to spare.
+//! Sorts in memory, on all free threads of the run.
 
 use std::cmp::Ordering;
 

@@ -1,4 +1,4 @@
-//! The disk the operating system shows.
+//! The disk of the operating system.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -7,7 +7,7 @@ use std::path::Path;
 use redb::backends::FileBackend;
 use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
 
-use super::disk::{Disk, Entry, FileId};
+use super::disk::{Disk, DiskEntry, FileId};
 use super::file_lock::{FileLock, Refused};
 
 /// Files and folders of this machine, with redb's own locks on database files.
@@ -31,7 +31,7 @@ impl Disk for RealDisk {
         backend(OpenOptions::new().read(true).write(true).open(path)?)
     }
 
-    fn open_to_look(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>> {
+    fn open_read_only(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>> {
         backend(File::open(path)?)
     }
 
@@ -89,11 +89,11 @@ impl Disk for RealDisk {
             .collect()
     }
 
-    fn entry(&self, path: &Path) -> Option<Entry> {
+    fn entry(&self, path: &Path) -> Option<DiskEntry> {
         let metadata = fs::metadata(path).ok()?;
         match metadata.is_dir() {
-            true => Some(Entry::Folder),
-            false => Some(Entry::File(metadata.len())),
+            true => Some(DiskEntry::Folder),
+            false => Some(DiskEntry::File(metadata.len())),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Failures of work that another process did.
+//! Failures of work in another process.
 
 use tetdb_schema::code::Code;
 

@@ -1,8 +1,8 @@
-//! Long arrays: memory that the system refuses is an error like a full disk, not the end of the process.
+//! Allocation of long arrays: refused memory is an error like a full disk, not the end of the process.
 
 use super::{StorageError, raise};
 
-/// Room for exactly `more` elements. Unwinds when the system has none.
+/// Reserves memory for exactly `more` elements. Unwinds if the system has none.
 pub fn reserve<T>(array: &mut Vec<T>, more: usize) {
     if array.try_reserve_exact(more).is_err() {
         let bytes = more.saturating_mul(size_of::<T>()) as u64;

@@ -1,7 +1,8 @@
-//! What belongs to one run and to no other in the process: its threads, its token, its panics.
+//! The context of one run in a process: its threads, its cancel token, its panics.
 //!
-//! The context is an attribute of a thread: the caller's while a call lasts, that of the run's own pool, and of the workers it starts.
-//! Parallel work goes through [`parallel`], which sends it to the pool of the run instead of the process's.
+//! The context is an attribute of a thread: of the caller's thread during a call, of the run's own pool, and of the
+//! workers it starts. Parallel work goes through [`parallel`], which sends it to the pool of the run instead of the
+//! process's.
 
 use std::cell::RefCell;
 use std::panic::PanicHookInfo;
@@ -23,15 +24,15 @@ thread_local! {
 /// The context of one run. Clones are the same run.
 #[derive(Clone)]
 pub struct RunContext {
-    run: Arc<Run>,
-    /// `None` on the pool's own threads, which are where parallel work belongs already.
+    run: Arc<RunState>,
+    /// `None` on the threads of the pool, where parallel work already runs.
     pool: Option<Arc<Pool>>,
 }
 
-struct Run {
+struct RunState {
     cancel: CancelToken,
     panic: Mutex<Option<CaughtPanic>>,
-    /// Threads beside the pool that have work of their own.
+    /// Threads outside the pool that are busy.
     busy: AtomicUsize,
 }
 
@@ -40,33 +41,33 @@ struct Run {
 pub struct CaughtPanic {
     /// The message and where it came from.
     pub message: String,
-    /// redb asserts what it reads: a damaged tree ends there.
+    /// True if the panic came from an assertion of redb, which means a damaged tree.
     pub is_in_redb: bool,
 }
 
 /// Threads, begun when they are first needed and ended with the run.
 struct Pool {
     n_threads: usize,
-    run: Arc<Run>,
+    run: Arc<RunState>,
     threads: OnceLock<Option<ThreadPool>>,
-    left: Arc<(Mutex<usize>, Condvar)>,
+    n_alive: Arc<(Mutex<usize>, Condvar)>,
 }
 
 impl RunContext {
-    /// A run with `n_threads` threads of its own, which ends when `cancel` says so.
+    /// A run with a pool of `n_threads` threads, which ends when `cancel` is cancelled.
     pub fn new(n_threads: usize, cancel: CancelToken) -> Self {
         catch_messages();
-        let run = Arc::new(Run { cancel, panic: Mutex::new(None), busy: AtomicUsize::new(0) });
+        let run = Arc::new(RunState { cancel, panic: Mutex::new(None), busy: AtomicUsize::new(0) });
         let pool = Pool {
             n_threads: n_threads.max(1),
             run: Arc::clone(&run),
             threads: OnceLock::new(),
-            left: Arc::default(),
+            n_alive: Arc::default(),
         };
         Self { run, pool: Some(Arc::new(pool)) }
     }
 
-    /// The context of this thread, for a thread it starts.
+    /// The context of this thread, to be entered by a thread it starts.
     pub fn current() -> Option<Self> {
         CURRENT.with_borrow(Clone::clone)
     }
@@ -83,7 +84,7 @@ impl RunContext {
         work()
     }
 
-    /// Does `work`, while which others of this run know that this thread is busy.
+    /// Runs `work` with this thread counted as busy.
     pub fn busy<T>(work: impl FnOnce() -> T) -> T {
         struct Busy(Option<RunContext>);
         impl Drop for Busy {
@@ -107,7 +108,7 @@ impl RunContext {
         panic.take()
     }
 
-    /// Whether the run of this thread is to end.
+    /// Returns whether the run of this thread is cancelled.
     #[inline]
     pub fn is_current_cancelled() -> bool {
         CURRENT.with_borrow(|current| current.as_ref().is_some_and(|c| c.run.cancel.is_cancelled()))
@@ -118,18 +119,18 @@ impl Pool {
     /// `None` where the system gives no threads: the caller's does all the work then.
     fn threads(&self) -> Option<&ThreadPool> {
         let begin = || {
-            let (run, left) = (Arc::clone(&self.run), Arc::clone(&self.left));
-            let gone = Arc::clone(&self.left);
+            let (run, n_alive) = (Arc::clone(&self.run), Arc::clone(&self.n_alive));
+            let n_alive_at_exit = Arc::clone(&self.n_alive);
             let built = ThreadPoolBuilder::new()
                 .num_threads(self.n_threads)
                 .start_handler(move |_| {
                     let run = Arc::clone(&run);
                     CURRENT.set(Some(RunContext { run, pool: None }));
-                    *left.0.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+                    *n_alive.0.lock().unwrap_or_else(PoisonError::into_inner) += 1;
                 })
                 .exit_handler(move |_| {
-                    *gone.0.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
-                    gone.1.notify_all();
+                    *n_alive_at_exit.0.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
+                    n_alive_at_exit.1.notify_all();
                 })
                 .build();
             built.ok()
@@ -145,8 +146,8 @@ impl Drop for Pool {
             // A thread that has not begun yet is counted only when it does.
             threads.as_ref().map(|pool| pool.broadcast(|_| ()));
             drop(threads);
-            let left = self.left.0.lock().unwrap_or_else(PoisonError::into_inner);
-            drop(self.left.1.wait_while(left, |n| *n > 0));
+            let n_alive = self.n_alive.0.lock().unwrap_or_else(PoisonError::into_inner);
+            drop(self.n_alive.1.wait_while(n_alive, |n| *n > 0));
         }
     }
 }
@@ -179,7 +180,7 @@ pub fn for_each_mut<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Sync + Sen
     }
 }
 
-/// What `found` makes of each item, in their order, in place of what `all` held: side by side where a thread is to spare.
+/// Replaces the content of `all` by the results of `found` for all items, in order; in parallel if a thread is free.
 pub fn map_into<T: Sync, U: Send>(
     items: &[T],
     all: &mut Vec<U>,
@@ -212,7 +213,8 @@ pub fn n_threads() -> usize {
     pool.map_or_else(rayon::current_num_threads, |pool| pool.n_threads)
 }
 
-/// Threads of this run that others who are busy leave to this one, itself among them. It changes from moment to moment: nothing that is made may depend on it.
+/// Number of threads of this run that are not busy, this thread included. The number changes at any moment: no result
+/// may depend on it.
 pub fn spare_threads() -> usize {
     let busy = RunContext::current().map_or(0, |context| context.run.busy.load(Ordering::Relaxed));
     n_threads().saturating_sub(busy.saturating_sub(1)).max(1)
@@ -230,7 +232,7 @@ fn catch_messages() {
     });
 }
 
-impl Run {
+impl RunState {
     fn remember(&self, info: &PanicHookInfo) {
         let file = info.location().map_or("", std::panic::Location::file);
         let mut panic = self.panic.lock().unwrap_or_else(PoisonError::into_inner);
@@ -284,7 +286,7 @@ mod tests {
     #[test]
     fn a_panic_is_kept_by_its_run_and_no_thread_is_left() {
         let run = RunContext::new(3, CancelToken::new());
-        let left = Arc::clone(&run.pool.as_ref().expect("it has a pool").left);
+        let n_alive = Arc::clone(&run.pool.as_ref().expect("it has a pool").n_alive);
         let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             run.enter(|| parallel(|| panic!("a broken invariant")))
         }));
@@ -293,6 +295,6 @@ mod tests {
         assert!(panic.message.contains("a broken invariant") && !panic.is_in_redb);
         assert_eq!(run.enter(n_threads), 3);
         drop(run);
-        assert_eq!(*left.0.lock().expect("nobody panics with it"), 0);
+        assert_eq!(*n_alive.0.lock().expect("nobody panics with it"), 0);
     }
 }

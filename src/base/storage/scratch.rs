@@ -1,4 +1,4 @@
-//! A file that nobody else sees and that is gone with the process.
+//! A private scratch file that disappears with the process.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,7 +13,7 @@ static FILES: AtomicU64 = AtomicU64::new(0);
 pub(super) struct ScratchFile {
     file: Box<dyn StorageBackend>,
     path: DiskPath,
-    /// Its name is gone already.
+    /// True if its name is removed already.
     is_nameless: bool,
 }
 
@@ -23,7 +23,7 @@ impl ScratchFile {
         let number = FILES.fetch_add(1, Ordering::Relaxed);
         let path = dir.join(format!(".tetdb-scratch-{}-{number}", std::process::id()));
         let file = path.at_path(path.disk().create(path.path()))?;
-        // Where a file without a name lives on while it is open, a run that is killed leaves nothing.
+        // On systems that keep an open file without a name, a killed run leaves nothing behind.
         let is_nameless = cfg!(unix) && path.remove_file().is_ok();
         Ok(Self { file, path, is_nameless })
     }
@@ -33,7 +33,7 @@ impl ScratchFile {
         self.path.at_path(self.file.read(at, out))
     }
 
-    /// Where it was created.
+    /// Path at which it was created.
     pub fn path(&self) -> &DiskPath {
         &self.path
     }
@@ -47,7 +47,7 @@ impl ScratchFile {
 impl Drop for ScratchFile {
     fn drop(&mut self) {
         if !self.is_nameless {
-            // It holds nothing that counts.
+            // The file has no content of value.
             let _ = self.path.remove_file();
         }
     }

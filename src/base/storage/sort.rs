@@ -1,7 +1,7 @@
 //! Sort more records than memory holds: sorted runs on disk, merged while read.
 //!
-//! All runs are in one file, for a process may open some hundreds only; and where there are more runs than memory has buffers for, they are
-//! merged to fewer first.
+//! All runs are in one file, because a process may open only some hundreds. If memory has too few buffers for all runs,
+//! some are merged first.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -13,27 +13,27 @@ use super::{DiskPath, StorageError, check_cancelled, reserve, sort_unstable_by};
 
 /// A run is read through at least this much buffer.
 const READ_BYTES_MIN: usize = 16 << 10;
-/// It is read through no more.
+/// Largest read buffer of a run.
 const READ_BYTES_MAX: usize = 1 << 20;
 /// A run is written through this much.
 const WRITE_BYTES: usize = 1 << 18;
-/// So many runs are merged at once however little memory there is.
+/// Runs merged at once, however little memory there is.
 const MERGED_MIN: usize = 8;
 
 /// Collects records; [`Sorter::finish`] gives them back in ascending order.
 ///
-/// Memory: `memory_bytes`, whatever is pushed, but 128 KiB at least, and 256 KiB while a run is written. Equal records stay as many as they
-/// were. The result does not depend on the memory, nor on threads.
+/// Memory: `memory_bytes` for any number of records, but 128 KiB at least, and 256 KiB while a run is written. Equal
+/// records are all kept. The result does not depend on the memory, nor on threads.
 pub struct Sorter<R: SortRecord> {
     records: Vec<R::Bytes>,
     records_max: usize,
     memory_bytes: usize,
     dir: DiskPath,
-    runs: VecDeque<Run>,
+    runs: VecDeque<SortedRun>,
 }
 
 /// Sorted records in a part of a file.
-struct Run {
+struct SortedRun {
     file: Arc<ScratchFile>,
     /// Bytes from here on.
     at: u64,
@@ -41,7 +41,7 @@ struct Run {
     end: u64,
 }
 
-/// Compares records by their bytes: the first sixteen, or eight, as one number, which is what nearly always decides.
+/// Compares records by their bytes: the first sixteen, or eight, as one number, which nearly always decides.
 #[inline(always)]
 fn order<B: SortBytes>(a: &B, b: &B) -> std::cmp::Ordering {
     let (a, b) = (a.as_ref(), b.as_ref());
@@ -116,7 +116,7 @@ impl<R: SortRecord> Sorter<R> {
         self.records = Vec::new();
         let at_once = (self.memory_bytes / READ_BYTES_MIN).max(MERGED_MIN);
         self.merge_down_to(at_once)?;
-        Sorted::of(self.runs, self.memory_bytes)
+        Sorted::new(self.runs, self.memory_bytes)
     }
 
     /// Merges the oldest runs, which are the shortest, until so many are left.
@@ -124,12 +124,12 @@ impl<R: SortRecord> Sorter<R> {
         while self.runs.len() > at_once {
             check_cancelled();
             let n = at_once.min(self.runs.len() - at_once + 1);
-            let oldest: VecDeque<Run> = self.runs.drain(..n).collect();
-            // Each round has a file of its own, so that the one before goes when all its runs are read.
+            let oldest: VecDeque<SortedRun> = self.runs.drain(..n).collect();
+            // Each round writes to a new file, so that the previous file is freed when all its runs are read.
             let is_read = |file| oldest.iter().any(|run| Arc::ptr_eq(&run.file, file));
             let beside = self.runs.back().filter(|last| !is_read(&last.file));
             let mut run = RunWriter::after(beside, &self.dir)?;
-            for record in Sorted::<R>::of(oldest, self.memory_bytes)? {
+            for record in Sorted::<R>::new(oldest, self.memory_bytes)? {
                 run.push(&record?.to_bytes())?;
             }
             self.runs.push_back(run.done()?);
@@ -140,18 +140,18 @@ impl<R: SortRecord> Sorter<R> {
 
 /// Writes a run.
 struct RunWriter {
-    run: Run,
+    run: SortedRun,
     buffer: Vec<u8>,
 }
 
 impl RunWriter {
-    /// Behind another run in its file, or in a file of its own. Errors: the disk.
-    fn after(last: Option<&Run>, dir: &DiskPath) -> Result<Self, StorageError> {
+    /// Starts a run after another one in its file, or in a new file. Errors: the disk.
+    fn after(last: Option<&SortedRun>, dir: &DiskPath) -> Result<Self, StorageError> {
         let (file, at) = match last {
             Some(run) => (Arc::clone(&run.file), run.end),
             None => (Arc::new(ScratchFile::create(dir)?), 0),
         };
-        let run = Run { file, at, end: at };
+        let run = SortedRun { file, at, end: at };
         let buffer = Vec::with_capacity(WRITE_BYTES);
         Ok(Self { run, buffer })
     }
@@ -172,14 +172,14 @@ impl RunWriter {
         Ok(())
     }
 
-    fn done(mut self) -> Result<Run, StorageError> {
+    fn done(mut self) -> Result<SortedRun, StorageError> {
         self.flush()?;
         Ok(self.run)
     }
 }
 
 struct RunReader {
-    run: Run,
+    run: SortedRun,
     buffer: Vec<u8>,
     /// Bytes of the buffer already given.
     given: usize,
@@ -216,7 +216,7 @@ pub struct Sorted<R: SortRecord> {
 
 impl<R: SortRecord> Sorted<R> {
     /// Merges runs while they are read, each through its share of so much memory.
-    fn of(runs: VecDeque<Run>, memory_bytes: usize) -> Result<Self, StorageError> {
+    fn new(runs: VecDeque<SortedRun>, memory_bytes: usize) -> Result<Self, StorageError> {
         let share = (memory_bytes / runs.len()).clamp(READ_BYTES_MIN, READ_BYTES_MAX);
         let mut sorted = Self {
             memory: Vec::new().into_iter(),

@@ -1,4 +1,4 @@
-//! Records that sort as their bytes do.
+//! Records whose bytes have the order of the records.
 
 /// A record of an external sort: its bytes, compared one after the other, have its order.
 ///
@@ -38,7 +38,7 @@ impl<const N: usize> SortRecord for [u8; N] {
 
 /// A field of a [`SortRecord`].
 pub trait SortField: Copy {
-    /// How many bytes it takes.
+    /// Number of bytes.
     const BYTES: usize;
     /// Writes it into exactly so many bytes.
     fn put(self, bytes: &mut [u8]);
@@ -120,7 +120,7 @@ impl<T: SortField, const N: usize> SortField for [T; N] {
     }
 }
 
-/// What a record carries along: its bytes as they are in memory, whose order means nothing but is always the same.
+/// Payload of a record: its bytes in memory order. Their order has no meaning, but is always the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Payload<T>(pub T);
 
@@ -185,10 +185,10 @@ pub use crate::sort_record;
 sort_record! {
     /// A number of something, and the key it is sorted by.
     #[derive(Eq)]
-    pub struct Keyed {
-        /// What comes first.
+    pub struct KeyedId {
+        /// The primary key.
         pub key: u64,
-        /// Its number.
+        /// The number of the item.
         pub id: u32,
     }
 }

@@ -1,7 +1,7 @@
-//! Pages that left memory in the middle of a step, in a file that nobody else sees and that ends with the pool.
+//! A private scratch file for pages that leave memory during a step; it ends with the pool.
 //!
-//! A step is done again from its beginning after a crash, so what it puts away meanwhile has no reader but itself: it needs neither a tree nor
-//! commits. A page goes from its frame to the file and back with one copy each way, where redb makes three.
+//! After a crash a step is repeated from its beginning, so the pages it spills are read by that step alone: they need
+//! neither a tree nor commits. A page takes one copy between its frame and the file, where redb takes three.
 
 use tetdb_schema::page::{FRAME_BYTES, Slot};
 
@@ -30,7 +30,7 @@ impl Spill {
         })
     }
 
-    /// Forgets what is at `place`, which may be written over.
+    /// Frees a slot, which may be overwritten.
     pub fn forget(&mut self, place: u32) {
         self.free.push(place);
     }
@@ -47,7 +47,7 @@ impl Spill {
         self.file.read(at, bytemuck::cast_slice_mut(frame))
     }
 
-    /// Where the file was created.
+    /// Path of the file.
     pub fn path(&self) -> &DiskPath {
         self.file.path()
     }

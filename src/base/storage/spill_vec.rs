@@ -1,6 +1,6 @@
 //! Long arrays: in memory while they fit their share of it, else in a scratch file behind a few frames.
 //!
-//! What an algorithm makes of them does not depend on where they are. A disk that fails unwinds, as pages do.
+//! The results of an algorithm do not depend on where its arrays are. A failing disk unwinds, as in the pager.
 
 use std::fmt;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ pub struct ScratchSpace {
 
 impl fmt::Debug for ScratchSpace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Room({} bytes, {:?})", self.budget.cap(), self.dir)
+        write!(f, "ScratchSpace({} bytes, {:?})", self.budget.cap(), self.dir)
     }
 }
 
@@ -44,20 +44,20 @@ impl ScratchSpace {
         self.budget.available()
     }
 
-    /// Counts what is held beside the arrays made here, as far as there is anything left: they take shares of the rest.
-    pub fn hold(&self, bytes: usize) -> Option<Lease> {
+    /// Leases bytes held outside the arrays created here, at most the bytes left: arrays take shares of the rest.
+    pub fn lease(&self, bytes: usize) -> Option<Lease> {
         let bytes = (bytes as u64).min(self.available());
         self.budget.lease(bytes, "what is held beside arrays").ok()
     }
 
-    /// `n` times `value`. A quarter of what is left is the most an array takes.
-    pub fn column<T: Pod>(&self, n: usize, value: T) -> SpillVec<T> {
+    /// `n` copies of `value`. An array in memory takes a quarter of the free bytes at most.
+    pub fn vec<T: Pod>(&self, n: usize, value: T) -> SpillVec<T> {
         let bytes = (n * size_of::<T>()) as u64;
         match &self.dir {
             Some(dir) if bytes > self.available() / 4 => {
                 let bytes = self.available() / 16;
                 let lease = self.budget.lease(bytes, "frames").ok();
-                // The least number of frames is taken whatever is left: half a megabyte.
+                // The least number of frames is always taken: half a megabyte.
                 let frames = ((bytes / PAGE_BYTES as u64) as usize).max(FRAMES_MIN);
                 let mut paged = PagedVec::new(dir, value, frames);
                 paged.resize(n);
@@ -71,12 +71,12 @@ impl ScratchSpace {
     }
 
     /// An empty array that grows.
-    pub fn list<T: Pod>(&self) -> SpillVecBuilder<T> {
-        self.list_within(self.available() / 8)
+    pub fn builder<T: Pod>(&self) -> SpillVecBuilder<T> {
+        self.builder_within(self.available() / 8)
     }
 
     /// An empty array that grows and takes at most `bytes`, in memory or as frames.
-    pub fn list_within<T: Pod>(&self, bytes: u64) -> SpillVecBuilder<T> {
+    pub fn builder_within<T: Pod>(&self, bytes: u64) -> SpillVecBuilder<T> {
         let frames = ((bytes / PAGE_BYTES as u64) as usize).max(FRAMES_MIN);
         SpillVecBuilder {
             memory: Vec::new(),
@@ -90,7 +90,7 @@ impl ScratchSpace {
         }
     }
 
-    /// Sorts in a quarter of what is left.
+    /// A sorter with a quarter of the free bytes.
     pub fn sorter<R: SortRecord>(&self) -> Sorter<R> {
         match &self.dir {
             Some(dir) => Sorter::new(dir, self.available() / 4),
@@ -122,7 +122,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
-    /// Makes `value` element `i`.
+    /// Sets element `i` to `value`.
     #[inline(always)]
     pub fn set(&mut self, i: usize, value: T) {
         match &mut self.place {
@@ -140,7 +140,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
-    /// How many elements there are.
+    /// Number of elements.
     pub fn len(&self) -> usize {
         match &self.place {
             Residence::Memory(all) => all.len(),
@@ -148,7 +148,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
-    /// Whether there is no element.
+    /// Returns whether there is no element.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -162,7 +162,7 @@ impl<T: Pod> SpillVec<T> {
     }
 
     /// The array for reading by many threads.
-    pub fn fixed(self) -> FrozenSpillVec<T> {
+    pub fn freeze(self) -> FrozenSpillVec<T> {
         match self.place {
             Residence::Memory(all) => FrozenSpillVec::Memory(all),
             Residence::Disk(paged) => {
@@ -201,7 +201,7 @@ impl<T: Pod> SpillVecBuilder<T> {
         self.memory.push(value);
     }
 
-    /// How many elements there are.
+    /// Number of elements.
     pub fn len(&self) -> usize {
         match &self.paged {
             Some(paged) => paged.len,
@@ -209,12 +209,12 @@ impl<T: Pod> SpillVecBuilder<T> {
         }
     }
 
-    /// Whether there is no element.
+    /// Returns whether there is no element.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Moves what is there to a scratch file.
+    /// Moves the elements to a scratch file.
     fn spill(&mut self) {
         let Some(dir) = &self.dir else { return };
         let all = std::mem::take(&mut self.memory);
@@ -226,7 +226,7 @@ impl<T: Pod> SpillVecBuilder<T> {
     }
 
     /// The array, as long as it is now.
-    pub fn done(mut self) -> SpillVec<T> {
+    pub fn finish(mut self) -> SpillVec<T> {
         let place = match self.paged {
             Some(paged) => Residence::Disk(paged),
             None => {
@@ -257,7 +257,7 @@ impl<T: Pod> FrozenSpillVec<T> {
         }
     }
 
-    /// How many elements there are.
+    /// Number of elements.
     pub fn len(&self) -> usize {
         match self {
             Self::Memory(all) => all.len(),
@@ -265,7 +265,7 @@ impl<T: Pod> FrozenSpillVec<T> {
         }
     }
 
-    /// Whether there is no element.
+    /// Returns whether there is no element.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -303,27 +303,27 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let n = 300_000;
         let mut found = Vec::new();
-        for room in [ScratchSpace::boundless(), ScratchSpace::new(1 << 20, dir.path())] {
-            let mut column = room.column(n, [7u32, 0]);
-            let is_paged = matches!(column.place, Residence::Disk(_));
-            assert_eq!(is_paged, room.dir.is_some());
+        for scratch in [ScratchSpace::boundless(), ScratchSpace::new(1 << 20, dir.path())] {
+            let mut array = scratch.vec(n, [7u32, 0]);
+            let is_paged = matches!(array.place, Residence::Disk(_));
+            assert_eq!(is_paged, scratch.dir.is_some());
             for i in places(n) {
-                let [a, b] = column.get(i);
-                column.set(i, [a.wrapping_mul(3), b + 1]);
+                let [a, b] = array.get(i);
+                array.set(i, [a.wrapping_mul(3), b + 1]);
             }
-            let mut list = room.list();
+            let mut builder = scratch.builder();
             for i in 0..n {
-                list.push(column.get(i));
+                builder.push(array.get(i));
             }
-            let fixed = list.done().fixed();
+            let fixed = builder.finish().freeze();
             assert_eq!(fixed.len(), n);
             let sums: Vec<u64> =
                 rayon::iter::ParallelIterator::collect(rayon::iter::ParallelIterator::map(
                     rayon::iter::IntoParallelIterator::into_par_iter(0..n),
                     |i| fixed.get(i).map(u64::from).iter().sum(),
                 ));
-            column.fill([1, 2]);
-            assert!((0..n).all(|i| column.get(i) == [1, 2]));
+            array.fill([1, 2]);
+            assert!((0..n).all(|i| array.get(i) == [1, 2]));
             found.push(sums);
         }
         assert!(found[0] == found[1]);
@@ -334,8 +334,8 @@ mod tests {
     #[test]
     fn a_folder_that_is_not_there_is_an_error() {
         let dir = tempfile::tempdir().expect("a folder");
-        let room = ScratchSpace::new(1 << 20, dir.path().join("missing"));
-        let made = attempt(|| drop(room.column(1 << 20, 0u64)));
-        assert!(matches!(made, Err(crate::storage::StorageError::Io { .. })), "{made:?}");
+        let scratch = ScratchSpace::new(1 << 20, dir.path().join("missing"));
+        let output = attempt(|| drop(scratch.vec(1 << 20, 0u64)));
+        assert!(matches!(output, Err(crate::storage::StorageError::Io { .. })), "{output:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Where an open surface is open: the rims of its holes, and vertices that lie on open edges.
+//! The open edges of a surface: boundary loops of its holes, and vertices that lie on open edges.
 
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::storage::parallel;
 pub(super) const JUNCTION_SHARE: f64 = 1e-6;
 /// Vertices as near as this to an end of an edge are meant to be that end, as a share of the box diagonal.
 const GAP_SHARE: f64 = 1e-9;
-/// Open edges that hang together: the rim of a hole.
+/// A connected group of open edges: the boundary of a hole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoundaryLoop {
     /// Number of edges.
@@ -42,7 +42,7 @@ pub struct TJunction {
     pub distance: f64,
 }
 
-/// The rims of the holes, the longest first.
+/// The boundary loops of all holes, the longest first.
 pub fn boundary_loops(surface: &Surface, closedness: &Closedness) -> Vec<BoundaryLoop> {
     let groups = open_groups(&closedness.open);
     let n_groups = groups.iter().max().map_or(0, |&g| g as usize + 1);
@@ -68,7 +68,7 @@ pub fn boundary_loops(surface: &Surface, closedness: &Closedness) -> Vec<Boundar
 
 /// Vertices of open edges that lie on another open edge, not farther than `distance_max` from it, in order of the edges.
 ///
-/// A vertex as near to an end of the edge is no junction, only a gap. Of several on one edge each is told.
+/// A vertex near an end of the edge is a gap, not a junction. Several vertices on one edge are all listed.
 pub fn t_junctions(
     surface: &Surface,
     closedness: &Closedness,
@@ -136,7 +136,7 @@ pub(super) fn has_near_junctions(
     parallel(|| open.map(beside).reduce(|| vec![false; distances.len()], either))
 }
 
-/// How far `p` is from the inside of the segment, unless it is farther than `distance_max`, or as near to an end.
+/// Distance of `p` from the inside of the segment; `None` beyond `distance_max`, or near an end.
 ///
 /// Exactly in line, only `gap` counts as near to an end.
 fn on_edge(p: Point, [a, b]: [Point; 2], distance_max: f64, gap: f64) -> Option<f64> {
@@ -151,7 +151,7 @@ fn on_edge(p: Point, [a, b]: [Point; 2], distance_max: f64, gap: f64) -> Option<
     to_inside([a, b], p).filter(|&distance| distance <= distance_max)
 }
 
-/// How far `p` is from the segment, if that is nearest to it between its ends.
+/// Distance of `p` from the segment, if the nearest point lies between its ends.
 fn to_inside([a, b]: [Point; 2], p: Point) -> Option<f64> {
     let share = (p - a).dot(b - a) / (b - a).length_squared();
     (share > 0.0 && share < 1.0).then(|| p.distance(a + (b - a) * share))

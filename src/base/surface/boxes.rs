@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use crate::geom::{Aabb, HilbertFrame, Point};
-use crate::storage::{FrozenSpillVec, Keyed, ScratchSpace, parallel, raise};
+use crate::storage::{FrozenSpillVec, KeyedId, OrRaise, ScratchSpace, parallel};
 
-/// Things in one leaf.
+/// Items in one leaf.
 const LEAF: usize = 4;
 /// Children of one node.
 const ARITY: usize = 4;
@@ -13,9 +13,9 @@ const ARITY: usize = 4;
 /// Keys and boxes found side by side.
 const AT_ONCE: usize = 1 << 16;
 
-/// Boxes of things in Hilbert order of their middles, and of groups of groups of them.
+/// Boxes of items in Hilbert order of their middles, and of nested groups of them.
 ///
-/// About 52 bytes per thing and a third of that for the tree: in memory, or in scratch files where the room is too small.
+/// Memory: about 52 bytes per item and a third of that for the tree, in memory or in scratch files.
 #[derive(Clone, Debug)]
 pub struct BoxTree {
     /// Numbers in curve order.
@@ -30,40 +30,37 @@ impl BoxTree {
     /// Children of a node.
     pub const ARITY: usize = ARITY;
 
-    /// A tree over those of `n` things within `bounds` that `keep` accepts. A scratch file that fails unwinds.
+    /// A tree over the items of `0..n` within `bounds` that `keep` accepts. A scratch file that fails unwinds.
     pub fn new(
         bounds: &Aabb,
         n: u32,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
         keep: impl Fn(u32) -> bool + Sync,
         box_of: impl Fn(u32) -> Aabb + Sync,
     ) -> Self {
         let frame = HilbertFrame::new(bounds);
-        let mut sorter = room.sorter::<Keyed>();
+        let mut sorter = scratch.sorter::<KeyedId>();
         for first in (0..n).step_by(AT_ONCE) {
             let some = first..n.min(first.saturating_add(AT_ONCE as u32));
-            let keys: Vec<Keyed> = parallel(|| {
+            let keys: Vec<KeyedId> = parallel(|| {
                 some.into_par_iter()
                     .filter(|&i| keep(i))
                     .map(|i| {
                         let Aabb { low, high } = box_of(i);
                         let key = frame.index((low + high) * 0.5);
-                        Keyed { key, id: i }
+                        KeyedId { key, id: i }
                     })
                     .collect()
             });
             for key in keys {
-                sorter.push(key).unwrap_or_else(|e| raise(e));
+                sorter.push(key).or_raise();
             }
         }
-        let mut sorted = sorter.finish().unwrap_or_else(|e| raise(e));
-        let (mut order, mut boxes) = (room.list(), room.list());
+        let mut sorted = sorter.finish().or_raise();
+        let (mut order, mut boxes) = (scratch.builder(), scratch.builder());
         loop {
-            let some: Vec<u32> = sorted
-                .by_ref()
-                .take(AT_ONCE)
-                .map(|keyed| keyed.unwrap_or_else(|e| raise(e)).id)
-                .collect();
+            let some: Vec<u32> =
+                sorted.by_ref().take(AT_ONCE).map(|keyed| keyed.or_raise().id).collect();
             if some.is_empty() {
                 break;
             }
@@ -71,46 +68,41 @@ impl BoxTree {
             some.into_iter().for_each(|i| order.push(i));
             around.into_iter().for_each(|b| boxes.push(b));
         }
-        let boxes = boxes.done().fixed();
-        let mut levels = vec![enclose(&boxes, LEAF, room)];
+        let boxes = boxes.finish().freeze();
+        let mut levels = vec![enclose(&boxes, LEAF, scratch)];
         while let Some(last) = levels.last()
             && last.len() > 1
         {
-            levels.push(enclose(last, ARITY, room));
+            levels.push(enclose(last, ARITY, scratch));
         }
-        Self { order: order.done().fixed(), boxes, levels }
+        Self { order: order.finish().freeze(), boxes, levels }
     }
 
-    /// Calls `visit` with the things whose boxes hold `p`, in curve order, until it returns true.
-    pub fn at(&self, p: Point, mut visit: impl FnMut(u32) -> bool) {
-        let holds = |b: &Aabb| b.low.cmple(p).all() && p.cmple(b.high).all();
-        let top = self.levels.len() - 1;
-        let mut stack: Vec<(usize, usize)> =
-            (0..self.levels[top].len()).map(|n| (top, n)).collect();
-        while let Some((level, node)) = stack.pop() {
-            if !holds(&self.levels[level].get(node)) {
-                continue;
-            }
-            if level > 0 {
-                let children = self.children(level, node).rev();
-                stack.extend(children.map(|child| (level - 1, child)));
-                continue;
-            }
-            for i in self.members(node) {
-                if holds(&self.boxes.get(i)) && visit(self.order.get(i)) {
-                    return;
-                }
-            }
-        }
+    /// Calls `visit` with the items whose boxes contain `p`, in curve order, until it returns true.
+    pub fn at(&self, p: Point, visit: impl FnMut(u32) -> bool) {
+        self.search(|b| b.low.cmple(p).all() && p.cmple(b.high).all(), visit);
     }
 
-    /// Calls `visit` with the things whose boxes share a point with some bounds, in curve order.
+    /// Calls `visit` with the items whose boxes share a point with `bounds`, in curve order.
     pub fn meeting(&self, bounds: &Aabb, mut visit: impl FnMut(u32)) {
+        self.search(
+            |b| b.meets(bounds),
+            |item| {
+                visit(item);
+                false
+            },
+        );
+    }
+
+    /// Calls `visit` with the items whose boxes `matches`, in curve order, until it returns true.
+    ///
+    /// A box around matching boxes must match as well.
+    fn search(&self, matches: impl Fn(&Aabb) -> bool, mut visit: impl FnMut(u32) -> bool) {
         let top = self.levels.len() - 1;
         let mut stack: Vec<(usize, usize)> =
             (0..self.levels[top].len()).map(|n| (top, n)).collect();
         while let Some((level, node)) = stack.pop() {
-            if !self.levels[level].get(node).meets(bounds) {
+            if !matches(&self.levels[level].get(node)) {
                 continue;
             }
             if level > 0 {
@@ -119,8 +111,8 @@ impl BoxTree {
                 continue;
             }
             for i in self.members(node) {
-                if self.boxes.get(i).meets(bounds) {
-                    visit(self.order.get(i));
+                if matches(&self.boxes.get(i)) && visit(self.order.get(i)) {
+                    return;
                 }
             }
         }
@@ -131,7 +123,7 @@ impl BoxTree {
         node * ARITY..((node + 1) * ARITY).min(self.levels[level - 1].len())
     }
 
-    /// Places of a leaf's things in curve order.
+    /// Positions of a leaf's items in curve order.
     pub fn members(&self, leaf: usize) -> std::ops::Range<usize> {
         leaf * LEAF..((leaf + 1) * LEAF).min(self.boxes.len())
     }
@@ -140,12 +132,12 @@ impl BoxTree {
 fn enclose(
     boxes: &FrozenSpillVec<Aabb>,
     group: usize,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> FrozenSpillVec<Aabb> {
-    let mut around = room.list();
+    let mut around = scratch.builder();
     for first in (0..boxes.len()).step_by(group) {
         let group = first..(first + group).min(boxes.len());
         around.push(group.fold(Aabb::EMPTY, |a, i| a.union(boxes.get(i))));
     }
-    around.done().fixed()
+    around.finish().freeze()
 }

@@ -1,4 +1,4 @@
-//! How two triangles touch, by exact signs.
+//! Contacts of two triangles, by exact signs.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use robust::Coord;
 
 use crate::geom::{Point, orient};
 
-/// What kind of contact two triangles have where they should have none.
+/// The kinds of contact between two triangles that should not touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ContactKind {
     /// An edge of one goes through the inside of the other.
@@ -46,23 +46,22 @@ impl fmt::Display for ContactKind {
     }
 }
 
-/// Where and how two triangles touch.
+/// A contact of two triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// How they touch.
+    /// Kind of the contact.
     pub kind: ContactKind,
     /// A point of the contact; rounded, unless it is a vertex.
     pub at: Point,
 }
 
-/// Whether triangles `p` and `q` touch elsewhere than in the vertices and the edge they share, and how.
+/// Returns whether triangles `p` and `q` touch elsewhere than in the vertices and the edge they share, and how.
 ///
-/// `p_ids` and `q_ids` are the vertices' ids; equal ids mean equal points and the reverse. Both triangles
-/// must have area. Triangles of the same three vertices give `None`: they are duplicates.
-/// The answer is exact; when several kinds apply the first in the order of [`ContactKind`] is given.
-/// What suffices for each number of shared vertices: none, every edge against the other triangle; one,
-/// the edge opposite to it, because the two cuts with the common line both begin at that vertex; two,
-/// whether the triangles lie in one plane on one side of the edge.
+/// `p_ids` and `q_ids` are the vertices' ids; equal ids mean equal points and the reverse. Both triangles must have
+/// area. Triangles of the same three vertices give `None`: they are duplicates. The answer is exact; if several kinds
+/// apply, the first in the order of [`ContactKind`] is given. The tests depend on the number of shared vertices. None:
+/// every edge against the other triangle. One: the edge opposite to it, because the two cuts with the common line both
+/// begin at that vertex. Two: whether the triangles lie in one plane on one side of the edge.
 pub fn contact(p: [Point; 3], p_ids: [u32; 3], q: [Point; 3], q_ids: [u32; 3]) -> Option<Contact> {
     let mut shared = [(0, 0); 3];
     let mut n = 0;
@@ -91,8 +90,8 @@ pub fn contact(p: [Point; 3], p_ids: [u32; 3], q: [Point; 3], q_ids: [u32; 3]) -
 #[inline]
 pub(super) fn side(t: &[Point; 3], x: Point) -> i8 {
     let [a, b, c] = *t;
-    // Four points of an axis plane are so common in made surfaces that they get a way past the
-    // expansions: they always end there, because the determinant is zero.
+    // Four points of an axis-parallel plane are common in generated surfaces. They skip the expansions, which would
+    // always be reached, because the determinant is zero.
     let flat = a.cmpeq(b) & b.cmpeq(c) & c.cmpeq(x);
     if flat.any() {
         return 0;
@@ -145,7 +144,7 @@ fn at_vertex(p: [Point; 3], q: [Point; 3]) -> Option<Contact> {
         return None;
     }
     if (c, d) == (0, 0) {
-        let plane = Projection::of(&p);
+        let plane = Projection::new(&p);
         if plane.are_corners_apart(&p, &q) {
             return None;
         }
@@ -167,7 +166,7 @@ fn at_edge(p: [Point; 3], y: Point) -> Option<Contact> {
     if side(&p, y) != 0 {
         return None;
     }
-    let plane = Projection::of(&p);
+    let plane = Projection::new(&p);
     let [u, v, x] = p;
     let overlap = plane.turn(u, v, x) * plane.turn(u, v, y) > 0;
     overlap.then(|| Contact { kind: ContactKind::CoplanarOverlap, at: (u + v + y) / 3.0 })
@@ -211,7 +210,7 @@ pub(super) fn edge_meets(
     Some(Contact { kind, at })
 }
 
-/// How two coplanar triangles are kept apart by a line through an edge of one.
+/// Separation of two coplanar triangles by a line through an edge of one.
 #[derive(Clone, Copy, PartialEq)]
 enum Separation {
     /// With nothing on the line.
@@ -229,7 +228,7 @@ pub(super) struct Projection {
 
 impl Projection {
     /// A projection for the plane of `t`, which must have area.
-    pub(super) fn of(t: &[Point; 3]) -> Self {
+    pub fn new(t: &[Point; 3]) -> Self {
         let normal = (t[1] - t[0]).cross(t[2] - t[0]).abs().to_array();
         let best = (0..3).max_by(|&i, &j| normal[i].total_cmp(&normal[j])).unwrap_or(2);
         let mut axes = [best, (best + 1) % 3, (best + 2) % 3].into_iter().map(|axis| Self { axis });
@@ -245,11 +244,11 @@ impl Projection {
     }
 
     /// 1 when `a b c` turn to the left, exactly.
-    pub(super) fn turn(self, a: Point, b: Point, c: Point) -> i8 {
+    pub fn turn(self, a: Point, b: Point, c: Point) -> i8 {
         sign(robust::orient2d(self.flat(a), self.flat(b), self.flat(c)))
     }
 
-    /// Whether two triangles of one plane with the same first vertex share nothing else: no side of either's corner there is in the
+    /// Returns whether two triangles of one plane with the same first vertex share nothing else: no side of either's corner there is in the
     /// other's. Most that share a vertex in an even wall do not, and this costs a third of looking for contacts.
     fn are_corners_apart(self, p: &[Point; 3], q: &[Point; 3]) -> bool {
         let is_apart = |t: &[Point; 3], other: &[Point; 3]| {
@@ -279,8 +278,8 @@ impl Projection {
         found
     }
 
-    /// Turns of `x` about the edges of `t`, made positive inside.
-    pub(super) fn turns_about(self, t: &[Point; 3], x: Point) -> [i8; 3] {
+    /// Turns of `x` about the edges of `t`, positive inside.
+    pub fn turns_about(self, t: &[Point; 3], x: Point) -> [i8; 3] {
         let hand = self.turn(t[0], t[1], t[2]);
         [0, 1, 2].map(|k| hand * self.turn(t[k], t[(k + 1) % 3], x))
     }
@@ -288,7 +287,7 @@ impl Projection {
 
 /// Two triangles of one plane without a shared vertex.
 fn in_plane(p: &[Point; 3], q: &[Point; 3]) -> Option<Contact> {
-    let separation = Projection::of(p).separation(p, q);
+    let separation = Projection::new(p).separation(p, q);
     if separation == Separation::Strict {
         return None;
     }
@@ -308,7 +307,7 @@ fn in_plane(p: &[Point; 3], q: &[Point; 3]) -> Option<Contact> {
 
 /// The closed segment `a b` in the plane of `t` against the closed `t`.
 pub(super) fn segment_in_plane(a: Point, b: Point, t: &[Point; 3]) -> Option<Contact> {
-    let plane = Projection::of(t);
+    let plane = Projection::new(t);
     let (about_a, about_b) = (plane.turns_about(t, a), plane.turns_about(t, b));
     let mut found = None;
     for (x, about) in [(a, about_a), (b, about_b)] {
@@ -337,7 +336,7 @@ pub(super) fn segment_in_plane(a: Point, b: Point, t: &[Point; 3]) -> Option<Con
 
 impl Projection {
     /// The rounded point where `a b` crosses the line `c d`.
-    pub(super) fn crossing(self, a: Point, b: Point, c: Point, d: Point) -> Point {
+    pub fn crossing(self, a: Point, b: Point, c: Point, d: Point) -> Point {
         let area = |x| robust::orient2d(self.flat(c), self.flat(d), self.flat(x)).abs();
         let (x, y) = (area(a), area(b));
         a + (b - a) * (x / (x + y))
@@ -361,7 +360,7 @@ mod tests {
                 continue;
             }
             let touch = worse(segment_in_plane(q[1], q[2], &p), segment_in_plane(p[1], p[2], &q));
-            let apart = Projection::of(&p).are_corners_apart(&p, &q);
+            let apart = Projection::new(&p).are_corners_apart(&p, &q);
             assert_eq!(apart, touch.is_none(), "{p:?} {q:?}");
             n_apart += u32::from(apart);
         }

@@ -1,7 +1,7 @@
-//! What can be wrong with a surface, in words, with the place and the way out.
+//! Defects of a surface: message, place and suggestion.
 
 use super::contact::ContactKind;
-use super::wire_set::WireError;
+use super::embedded_set::EmbedError;
 use crate::geom::Point;
 use tetdb_schema::code::Code;
 
@@ -11,12 +11,12 @@ pub enum SurfaceError {
     /// There are too many vertices, triangles or labels to number.
     #[error("the surface has more than {limit} {what}")]
     TooLarge {
-        /// What there is too much of.
+        /// Kind of the items.
         what: &'static str,
         /// The most allowed.
         limit: usize,
     },
-    /// It does not fit the memory allowed.
+    /// The surface exceeds the memory allowed.
     #[error(
         "{triangles} triangles and {vertices} vertices, and there are more, take more than the {bytes_max} bytes of memory allowed"
     )]
@@ -32,7 +32,7 @@ pub enum SurfaceError {
     #[error(
         "edges and points of {vertices} vertices, or more, take more than the {bytes_max} bytes of memory allowed"
     )]
-    WireMemory {
+    EmbedMemory {
         /// Bytes allowed.
         bytes_max: u64,
         /// Vertices known so far.
@@ -56,7 +56,7 @@ pub enum SurfaceError {
         /// Its longest extent.
         extent: f64,
     },
-    /// Validation found defects; the first of the worst kind is told.
+    /// Validation found defects; the error has the first of the worst kind.
     #[error("{defect}")]
     Invalid {
         /// The first defect of the worst kind.
@@ -66,12 +66,12 @@ pub enum SurfaceError {
     },
     /// An embedded edge or point cannot be there.
     #[error(transparent)]
-    Wire(Box<WireError>),
+    Embed(Box<EmbedError>),
 }
 
-impl From<WireError> for SurfaceError {
-    fn from(error: WireError) -> Self {
-        Self::Wire(Box::new(error))
+impl From<EmbedError> for SurfaceError {
+    fn from(error: EmbedError) -> Self {
+        Self::Embed(Box::new(error))
     }
 }
 
@@ -79,7 +79,7 @@ impl From<WireError> for SurfaceError {
 const COUNT_MAX: usize = 1 << 30;
 
 impl SurfaceError {
-    /// Refuses more of `what` than can be numbered.
+    /// Refuses more items of kind `what` than can be numbered.
     pub(super) fn check_size(what: &'static str, n: usize) -> Result<(), Self> {
         match n <= COUNT_MAX {
             true => Ok(()),
@@ -91,29 +91,29 @@ impl SurfaceError {
     pub fn code(&self) -> Code {
         match self {
             Self::TooLarge { .. } => Code::SurfaceTooLarge,
-            Self::Memory { .. } | Self::WireMemory { .. } => Code::Memory,
+            Self::Memory { .. } | Self::EmbedMemory { .. } => Code::Memory,
             Self::NoSuchVertex { .. } => Code::IndexOutOfRange,
             Self::TooSmall { .. } => Code::CoordinateRange,
             Self::Invalid { defect, .. } => defect.code(),
-            Self::Wire(wire) => wire.code(),
+            Self::Embed(wire) => wire.code(),
         }
     }
 
-    /// What to do about it.
+    /// A suggestion for the user.
     pub fn help(&self) -> &'static str {
         match self {
             Self::TooLarge { .. } => "split the surface into parts and mesh them one by one",
             Self::Memory { .. } => "allow more memory, or take a coarser surface",
-            Self::WireMemory { .. } => "allow more memory, or take fewer edges and points",
+            Self::EmbedMemory { .. } => "allow more memory, or take fewer edges and points",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),
-            Self::Wire(wire) => wire.help(),
+            Self::Embed(wire) => wire.help(),
         }
     }
 }
 
-/// One thing that makes a surface unfit to bound volumes, with the triangles (input ids) it is about.
+/// A defect that makes a surface unfit to bound volumes, with its triangles (input ids).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Defect {
     /// The surface has no triangle.
@@ -124,12 +124,12 @@ pub enum Defect {
     Degenerate {
         /// The triangle.
         triangle: u32,
-        /// Whether two corners are one vertex.
+        /// True if two corners are one vertex.
         repeated: bool,
         /// Its corners.
         corners: [Point; 3],
     },
-    /// The same three vertices twice in the same cyclic order.
+    /// Three vertices that occur twice in the same cyclic order.
     #[error("triangle {} repeats triangle {}", triangles[1], triangles[0])]
     Duplicate {
         /// The two triangles.
@@ -145,11 +145,11 @@ pub enum Defect {
         triangle: u32,
         /// Vertices of the edge.
         vertices: [u32; 2],
-        /// Where the edge begins.
+        /// Begin of the edge.
         from: Point,
-        /// Where the edge ends.
+        /// End of the edge.
         to: Point,
-        /// A vertex that lies on the edge, or as good as: a T-junction.
+        /// A vertex that lies on the edge, or nearly: a T-junction.
         junction: Option<Point>,
     },
     /// Two triangles touch elsewhere than in the vertices and edges they share.
@@ -157,14 +157,14 @@ pub enum Defect {
     SelfIntersection {
         /// The two triangles.
         triangles: [u32; 2],
-        /// How they touch.
+        /// Kind of the contact.
         kind: ContactKind,
         /// A point where they touch.
         at: Point,
     },
 }
 
-/// A position, for messages: the numbers as they are, very large and very small ones with a power of ten.
+/// A position for messages; very large and very small numbers have a power of ten.
 pub fn show(p: Point) -> String {
     let [x, y, z] = p.to_array().map(show_number);
     format!("({x}, {y}, {z})")
@@ -224,7 +224,7 @@ impl Defect {
         }
     }
 
-    /// What to do about it.
+    /// A suggestion for the user.
     pub fn help(&self) -> &'static str {
         match self {
             Self::Empty => "choose a file that holds triangles",

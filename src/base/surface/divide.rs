@@ -1,32 +1,37 @@
-//! Triangles divided where vertices of wires lie on them.
+//! Divides triangles at embedded vertices that lie on them.
 //!
-//! A vertex exactly inside a triangle divides it in three, one exactly on an edge divides each triangle that has the edge in two: the
-//! surface stays the same set of points. A vertex that is a rounding error beside would bend it, and divides nothing.
+//! A vertex exactly inside a triangle divides it in three. A vertex exactly on an edge divides each triangle at that
+//! edge in two. The surface stays the same set of points. A vertex off the triangle by a rounding error would bend the
+//! surface, so it divides nothing.
 
 use std::collections::HashMap;
 
-use super::broad::tree_of;
+use super::box_pairs::tree_of;
+use super::embedded_contact::{has_area, is_on_edge, point_at_triangle};
 use super::split::swap_inside;
 use super::weld::PointTable;
-use super::wire_contact::{has_area, is_on_edge, point_at_triangle};
-use super::{Surface, SurfaceError, WireSet};
+use super::{EmbeddedSet, Surface, SurfaceError};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
 
 impl Surface {
     /// Divides triangles where vertices of `set` lie exactly on them; returns how many of these there are.
     ///
-    /// Labels and sheets stay; what holds wires that are there goes, see [`Surface::hold_wires`]. Triangles stand where the one was that
-    /// they are of. Memory: beside the tree some 200 bytes for each vertex.
+    /// Labels and sheets are kept; support triangles are dropped, see [`Surface::add_support_triangles`]. The parts of
+    /// a triangle stand at its place in the order. Memory: about 200 bytes for each vertex and the tree.
     ///
     /// # Errors
     /// [`SurfaceError::TooLarge`].
-    pub fn divide_at(&mut self, set: &WireSet, room: &ScratchSpace) -> Result<usize, SurfaceError> {
-        self.drop_fins();
-        let tree = tree_of(self, room, |t| has_area(&self.corners(t)));
-        let mut table = PointTable::of(&self.points);
+    pub fn divide_at(
+        &mut self,
+        set: &EmbeddedSet,
+        scratch: &ScratchSpace,
+    ) -> Result<usize, SurfaceError> {
+        self.drop_support_triangles();
+        let tree = tree_of(self, scratch, |t| has_area(&self.corners(t)));
+        let mut table = PointTable::new(&self.points);
         let mut points = std::mem::take(&mut self.points);
-        let mut pieces = Pieces::of(&self.triangles);
+        let mut pieces = TrianglePieces::new(&self.triangles);
         let mut vertices = HashMap::new();
         let mut n = 0;
         let ends = set.edges.iter().flat_map(|&[a, b, _]| [a, b]);
@@ -45,18 +50,18 @@ impl Surface {
         }
         self.points = points;
         if n > 0 {
-            // Edges that the wires have among the new ones are not swapped.
-            let own = self.wires.edges.len();
+            // New edges that are embedded edges are not swapped.
+            let own = self.embedded.edges.len();
             let edges = set.edges.iter();
-            (self.wires.edges).extend(edges.map(|[a, b, _]| [vertices[a], vertices[b], 0]));
+            (self.embedded.edges).extend(edges.map(|[a, b, _]| [vertices[a], vertices[b], 0]));
             self.take(&pieces);
-            self.wires.edges.truncate(own);
+            self.embedded.edges.truncate(own);
         }
         Ok(n)
     }
 
-    /// Puts the pieces in the place of what they are of.
-    fn take(&mut self, pieces: &Pieces) {
+    /// Replaces each divided triangle by its pieces.
+    fn take(&mut self, pieces: &TrianglePieces) {
         let n = self.triangles.len() as u32;
         let mut whole = std::mem::take(self);
         whole.triangles = Vec::with_capacity(pieces.corners.len());
@@ -76,14 +81,14 @@ impl Surface {
 }
 
 /// Triangles, pieces of them and pieces of pieces.
-struct Pieces {
+struct TrianglePieces {
     corners: Vec<[u32; 3]>,
-    /// What a triangle was divided into: so many from this one on.
+    /// The parts of a divided triangle: number of the first, and count.
     parts: HashMap<u32, (u32, u32)>,
 }
 
-impl Pieces {
-    fn of(triangles: &[[u32; 3]]) -> Self {
+impl TrianglePieces {
+    fn new(triangles: &[[u32; 3]]) -> Self {
         Self { corners: triangles.to_vec(), parts: HashMap::new() }
     }
 

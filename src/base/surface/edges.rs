@@ -1,13 +1,13 @@
-//! Which triangles meet at which edges: holes, repeated and collapsed triangles, parts.
+//! Triangles at each edge: open edges, repeated and collapsed triangles, connected parts.
 
 use rayon::prelude::*;
 use robust::Coord;
 
 use super::Surface;
 use crate::geom::Point;
-use crate::storage::{ScratchSpace, SpillVec, parallel, raise, sort_record};
+use crate::storage::{OrRaise, ScratchSpace, SpillVec, parallel, sort_record};
 
-/// What edges alone tell about a surface.
+/// Properties of a surface that follow from its edges.
 ///
 /// A facet given twice with opposite orientation is one two-sided facet and counts once at its edges.
 /// Lists are sorted by triangle.
@@ -19,11 +19,11 @@ pub struct Closedness {
     pub open: Vec<(u32, [u32; 2])>,
     /// Edges with one triangle that is part of a sheet, where the sheet ends inside.
     pub n_free: usize,
-    /// Connected groups of open edges: the rims of the holes.
+    /// Connected groups of open edges: boundary loops of the holes.
     pub n_open_loops: usize,
     /// Edges with three or more facets.
     pub n_nonmanifold: usize,
-    /// Of those, the ones with an odd number: walls that divide a volume.
+    /// Non-manifold edges with an odd number of facets: walls that divide a volume.
     pub n_odd: usize,
     /// Edges of two triangles that run along them in the same direction.
     pub n_inconsistent: usize,
@@ -38,7 +38,7 @@ pub struct Closedness {
 }
 
 impl Closedness {
-    /// Whether every edge has a second facet.
+    /// Returns whether every edge has a second facet.
     pub fn is_closed(&self) -> bool {
         self.open.is_empty()
     }
@@ -46,7 +46,7 @@ impl Closedness {
 
 /// Looks at the edges of a surface. Near-linear: two sorts; memory 16 bytes per triangle and 12 per edge use.
 pub fn closedness(surface: &Surface) -> Closedness {
-    Facets::of(surface, &ScratchSpace::boundless()).closedness(surface)
+    Facets::new(surface, &ScratchSpace::boundless()).closedness(surface)
 }
 
 /// The triangles that count: collapsed ones and repetitions set apart.
@@ -55,7 +55,7 @@ pub(super) struct Facets {
     pub duplicates: Vec<[u32; 2]>,
     pub two_sided: Vec<[u32; 2]>,
     /// Uses of edges by facets, sorted by edge.
-    uses: SpillVec<EdgeUse>,
+    uses: SpillVec<TriangleAtEdge>,
     /// Per triangle: not the first of its vertices, or a vertex repeated.
     pub is_left_out: Vec<bool>,
 }
@@ -64,7 +64,7 @@ sort_record! {
     /// One facet at one edge.
     #[derive(Eq, PartialOrd, Ord, bytemuck::Pod, bytemuck::Zeroable)]
     #[repr(C)]
-    pub(super) struct EdgeUse {
+    pub(super) struct TriangleAtEdge {
         /// The edge's vertices, the smaller one first.
         pub edge: [u32; 2],
         /// `4 * triangle + k`, the edge going from corner k to the next.
@@ -81,7 +81,7 @@ sort_record! {
     }
 }
 
-impl EdgeUse {
+impl TriangleAtEdge {
     pub fn triangle(self) -> u32 {
         self.half >> 2
     }
@@ -103,14 +103,14 @@ impl EdgeUse {
     }
 }
 
-/// Whether two uses of one edge run along it in the same direction.
-pub(super) fn same_direction(surface: &Surface, a: EdgeUse, b: EdgeUse) -> bool {
+/// Returns whether two uses of one edge run along it in the same direction.
+pub(super) fn same_direction(surface: &Surface, a: TriangleAtEdge, b: TriangleAtEdge) -> bool {
     a.is_forward(surface) == b.is_forward(surface)
 }
 
 impl Facets {
     /// A scratch file that fails unwinds.
-    pub fn of(surface: &Surface, room: &ScratchSpace) -> Self {
+    pub fn new(surface: &Surface, scratch: &ScratchSpace) -> Self {
         let degenerate: Vec<(u32, bool)> = parallel(|| {
             (0..surface.n_triangles() as u32)
                 .into_par_iter()
@@ -121,33 +121,32 @@ impl Facets {
         for &(t, repeated) in &degenerate {
             is_left_out[t as usize] = repeated;
         }
-        let (duplicates, two_sided) = repetitions(surface, &mut is_left_out, room);
-        let mut sorter = room.sorter::<EdgeUse>();
+        let (duplicates, two_sided) = repetitions(surface, &mut is_left_out, scratch);
+        let mut sorter = scratch.sorter::<TriangleAtEdge>();
         for (t, triangle) in (0u32..).zip(&surface.triangles) {
             if is_left_out[t as usize] {
                 continue;
             }
             for k in 0..3 {
                 let (a, b) = (triangle[k as usize], triangle[(k as usize + 1) % 3]);
-                let edge_use = EdgeUse { edge: [a.min(b), a.max(b)], half: 4 * t + k };
-                let pushed = sorter.push(edge_use);
-                pushed.unwrap_or_else(|e| raise(e));
+                let edge_use = TriangleAtEdge { edge: [a.min(b), a.max(b)], half: 4 * t + k };
+                sorter.push(edge_use).or_raise();
             }
         }
-        let mut uses = room.list();
-        for edge_use in sorter.finish().unwrap_or_else(|e| raise(e)) {
-            uses.push(edge_use.unwrap_or_else(|e| raise(e)));
+        let mut uses = scratch.builder();
+        for edge_use in sorter.finish().or_raise() {
+            uses.push(edge_use.or_raise());
         }
-        let uses = uses.done();
+        let uses = uses.finish();
         Self { degenerate, duplicates, two_sided, uses, is_left_out }
     }
 
     /// Calls `visit` with the uses of each edge together.
-    pub fn each_edge(&mut self, mut visit: impl FnMut(&[EdgeUse])) {
+    pub fn each_edge(&mut self, mut visit: impl FnMut(&[TriangleAtEdge])) {
         let mut together = Vec::new();
         for i in 0..self.uses.len() {
             let next = self.uses.get(i);
-            if together.last().is_some_and(|u: &EdgeUse| u.edge != next.edge) {
+            if together.last().is_some_and(|u: &TriangleAtEdge| u.edge != next.edge) {
                 visit(&together);
                 together.clear();
             }
@@ -201,7 +200,7 @@ impl Facets {
     }
 }
 
-/// Whether triangle `t` has no area, exactly: `Some(true)` when a vertex is repeated.
+/// Returns whether triangle `t` has no area, exactly: `Some(true)` when a vertex is repeated.
 fn collapse(surface: &Surface, t: u32) -> Option<bool> {
     let [a, b, c] = surface.triangles[t as usize];
     if a == b || b == c || c == a {
@@ -215,23 +214,22 @@ fn collapse(surface: &Surface, t: u32) -> Option<bool> {
 fn repetitions(
     surface: &Surface,
     is_left_out: &mut [bool],
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
-    let mut sorter = room.sorter::<SortedTriangle>();
+    let mut sorter = scratch.sorter::<SortedTriangle>();
     for (t, triangle) in (0u32..).zip(&surface.triangles) {
         if !is_left_out[t as usize] {
             let mut vertices = *triangle;
             vertices.sort_unstable();
-            let pushed = sorter.push(SortedTriangle { vertices, triangle: t });
-            pushed.unwrap_or_else(|e| raise(e));
+            sorter.push(SortedTriangle { vertices, triangle: t }).or_raise();
         }
     }
     let (mut duplicates, mut two_sided) = (Vec::new(), Vec::new());
     // A wall may be given from both sides, a sheet is given once, and not where a shell is.
     // Of the set at hand: its vertices, the first triangle, the first one of the other orientation.
     let mut set = None::<([u32; 3], u32, Option<u32>)>;
-    for key in sorter.finish().unwrap_or_else(|e| raise(e)) {
-        let SortedTriangle { vertices, triangle: t } = key.unwrap_or_else(|e| raise(e));
+    for key in sorter.finish().or_raise() {
+        let SortedTriangle { vertices, triangle: t } = key.or_raise();
         let Some((_, first, opposite)) = set.as_mut().filter(|set| set.0 == vertices) else {
             set = Some((vertices, t, None));
             continue;
@@ -253,7 +251,7 @@ fn repetitions(
     (duplicates, two_sided)
 }
 
-/// Whether sorting the vertices takes an odd number of exchanges.
+/// Returns whether sorting the vertices takes an odd number of exchanges.
 fn is_odd([a, b, c]: [u32; 3]) -> bool {
     (a < b) ^ (b < c) ^ (c < a)
 }
@@ -324,7 +322,7 @@ pub(super) fn ends(open: &[(u32, [u32; 2])]) -> Vec<u32> {
     vertices
 }
 
-/// Whether three points lie on a line, exactly.
+/// Returns whether three points lie on a line, exactly.
 pub(super) fn in_line(a: Point, b: Point, c: Point) -> bool {
     let flat = |axis: fn(Point) -> Coord<f64>| robust::orient2d(axis(a), axis(b), axis(c)) == 0.0;
     flat(|p| Coord { x: p.x, y: p.y })

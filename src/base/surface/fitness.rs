@@ -1,4 +1,4 @@
-//! How well the triangles of a surface are shaped: every input triangle stays, and a needle makes bad tetrahedra.
+//! Shapes of the triangles: every input triangle stays, and a needle forces bad tetrahedra.
 
 use std::cmp::Ordering;
 
@@ -14,7 +14,7 @@ const SMALL_ANGLE_DEGREES: f64 = 5.0;
 const FORCED_QUALITY: f64 = 2.0;
 /// √6/12, the inradius of the regular tetrahedron of edge length 1.
 const ALPHA: f64 = 0.204_124_145_231_931_5;
-/// Shapes of the triangles and what follows for the tetrahedra on them.
+/// Shapes of the triangles, and their consequences for the tetrahedra on them.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Fitness {
     /// Triangles with an angle below 5 degrees; those without area are among them.
@@ -31,19 +31,19 @@ pub struct Fitness {
     pub edge_max: f64,
     /// Triangles on which every tetrahedron has quality 2 or worse.
     pub forcing_triangles: u64,
-    /// The same with quality 10 or worse.
+    /// Triangles on which every tetrahedron has quality 10 or worse.
     pub hopeless_triangles: u64,
     /// The triangle with the smallest inscribed circle for its longest edge, the first of equal ones: it allows the worst quality.
     pub worst_triangle: u32,
     /// Area of the surface, in squared input units.
     pub area: f64,
-    /// What the surface encloses, each part counted positive; none when it is open.
+    /// Enclosed volume, each part counted positive; `None` if the surface is open.
     pub volume: Option<f64>,
 }
 
 /// Sums over triangles.
 #[derive(Clone, Copy)]
-struct Sums {
+struct ShapeSums {
     n_small: u64,
     angle: f64,
     low: f64,
@@ -63,7 +63,7 @@ pub fn fitness(surface: &Surface, closedness: &Closedness) -> Fitness {
     if n == 0 {
         return Fitness::default();
     }
-    let none = Sums {
+    let none = ShapeSums {
         n_small: 0,
         angle: f64::INFINITY,
         low: f64::INFINITY,
@@ -95,8 +95,8 @@ pub fn fitness(surface: &Surface, closedness: &Closedness) -> Fitness {
     }
 }
 
-fn join(a: Sums, b: Sums) -> Sums {
-    Sums {
+fn join(a: ShapeSums, b: ShapeSums) -> ShapeSums {
+    ShapeSums {
         n_small: a.n_small + b.n_small,
         angle: a.angle.min(b.angle),
         low: a.low.min(b.low),
@@ -121,7 +121,7 @@ fn area(surface: &Surface, t: u32) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-fn shape(surface: &Surface, t: u32) -> Sums {
+fn shape(surface: &Surface, t: u32) -> ShapeSums {
     let lengths = edge_lengths(surface, t);
     let corners = surface.corners(t);
     let angles = [0, 1, 2].map(|i| {
@@ -135,7 +135,7 @@ fn shape(surface: &Surface, t: u32) -> Sums {
     // A collapsed triangle has inradius 0, or none at all; then the quality is without bound.
     let quality = ALPHA * high / inradius;
     let is_worse = |bound: f64| u64::from(quality.is_nan() || quality >= bound);
-    Sums {
+    ShapeSums {
         n_small: u64::from(angle < SMALL_ANGLE_DEGREES.to_radians()),
         angle,
         low: lengths.into_iter().fold(f64::INFINITY, f64::min),

@@ -1,42 +1,42 @@
 //! The input: a closed surface of triangles with labels, welded and validated exactly.
 //!
-//! Reading order: [`triangles`](Surface) (what a surface is), `weld` (how readers build one),
-//! `edges` (which triangles meet where), `orientation` (turning triangles the same way), `contact`
-//! (how two triangles touch), `boxes`, `broad` and `stars` (which pairs to look at), `validate` (all of it together),
-//! `defect` (what can be wrong and what to do about it), `boundary_loops` (where it is open), `near` and `repair`
-//! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
-//! `seek` (distances and what lies above), `volumes` (what is enclosed), `seeds` (what points say of volumes), `sheets` (embedded triangles with volume on both sides),
-//! `wire_set` and `wires` (embedded edges and points), `wire_contact` (how they touch), `divide` (triangles divided where they lie
-//! on them), `fins` (what holds edges), `point_sizes`.
+//! Reading order: [`triangles`](Surface) (the surface), `weld` (building one), `edges` (triangles at each edge),
+//! `orientation` (turning triangles alike), `contact` (how two triangles touch), `boxes`, `box_pairs` and `stars`
+//! (pairs that may touch), `validate` (all checks), `defect` (errors and suggestions), `boundary_loops` (open edges),
+//! `weld_near` and `repair` (repair on demand), `fitness` (mesh quality that the triangles allow), `split` (finer
+//! triangles), `seeker` (distances, triangles above a point), `volumes` (enclosed volumes), `seeds` (points that name
+//! volumes), `sheets` (embedded triangles), `embedded_set` and `embedded` (embedded edges and points),
+//! `embedded_contact` (their contacts), `divide` (triangles divided at embedded vertices), `support_triangles` (which
+//! keep embedded edges), `point_sizes`.
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
 mod boundary_loops;
+mod box_pairs;
 mod boxes;
-mod broad;
 mod contact;
 mod defect;
 mod divide;
 mod edges;
-mod fins;
+mod embedded;
+mod embedded_contact;
+mod embedded_set;
 mod fitness;
-mod near;
 mod orientation;
 mod point_sizes;
 mod point_tree;
 mod repair;
 mod seeds;
-mod seek;
+mod seeker;
 mod sheets;
 mod split;
 mod stars;
+mod support_triangles;
 mod triangles;
 mod validate;
 mod volumes;
 mod weld;
-mod wire_contact;
-mod wire_set;
-mod wires;
+mod weld_near;
 
 #[cfg(test)]
 mod tests;
@@ -47,15 +47,15 @@ pub use contact::{Contact, ContactKind, contact};
 pub use defect::show;
 pub use defect::{Defect, SurfaceError};
 pub use edges::{Closedness, closedness};
+pub use embedded_set::{EmbedError, Embedded, EmbeddedSet};
 pub use fitness::{Fitness, fitness};
-pub use near::weld_near;
-pub use orientation::{Orientation, orient_alike, orient_alike_in};
+pub use orientation::{Orientation, orient_alike, orient_alike_with};
 pub use repair::{Closing, Repair, closing, repair, repair_bytes};
 pub use seeds::{Seed, SeedKind};
-pub use seek::{Crossing, Seeker};
+pub use seeker::{Crossing, Seeker};
 pub use split::{SplitReport, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
-pub use validate::{Validation, validate, validate_in};
-pub use volumes::{OUTSIDE, VOLUMES_TRIANGLE, Volumes, Wall};
+pub use validate::{Validation, validate, validate_with};
+pub use volumes::{EnclosedVolumes, OUTSIDE, VOLUMES_TRIANGLE, Wall};
 pub use weld::SurfaceBuilder;
-pub use wire_set::{WireError, WireSet, Wires};
+pub use weld_near::weld_near;

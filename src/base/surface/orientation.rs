@@ -1,11 +1,11 @@
-//! Turning triangles the same way, from neighbor to neighbor.
+//! Turns triangles the same way, from neighbor to neighbor.
 
 use super::Surface;
 use super::edges::{Facets, Groups, same_direction};
 use super::sheets::each_pair;
 use crate::storage::ScratchSpace;
 
-/// What [`orient_alike`] did.
+/// Result of [`orient_alike`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Orientation {
     /// Triangles turned round, in increasing order.
@@ -18,19 +18,18 @@ pub struct Orientation {
 
 /// Turns triangles so that the two at each manifold edge run along it in opposite directions.
 ///
-/// Orientation passes only through edges with exactly two facets. In each patch the fewer triangles are
-/// turned (on a tie those unlike the first), so one inverted triangle is what changes. A two-sided
-/// facet's second triangle turns with its first. Effects: exchanges two corners of a turned triangle;
-/// ids, labels and vertices stay.
+/// Orientation passes only through edges with exactly two facets. In each patch the smaller group of triangles is
+/// turned (on a tie those unlike the first), so that one inverted triangle is turned alone. A two-sided facet's second
+/// triangle turns with its first. Effects: exchanges two corners of a turned triangle; ids, labels and vertices stay.
 pub fn orient_alike(surface: &mut Surface) -> Orientation {
-    orient_alike_in(surface, &ScratchSpace::boundless())
+    orient_alike_with(surface, &ScratchSpace::boundless())
 }
 
-/// [`orient_alike`] in a room: of a surface that has nothing to be turned, 5 bytes a triangle are held beside it.
+/// [`orient_alike`] within scratch space. A surface that needs no turning takes 5 bytes a triangle of memory.
 ///
 /// A scratch file that fails unwinds.
-pub fn orient_alike_in(surface: &mut Surface, room: &ScratchSpace) -> Orientation {
-    let mut facets = Facets::of(surface, room);
+pub fn orient_alike_with(surface: &mut Surface, scratch: &ScratchSpace) -> Orientation {
+    let mut facets = Facets::new(surface, scratch);
     if let Some(n_patches) = patches_of_one_way(surface, &mut facets) {
         return Orientation { n_patches, ..Orientation::default() };
     }
@@ -63,7 +62,7 @@ pub fn orient_alike_in(surface: &mut Surface, room: &ScratchSpace) -> Orientatio
                 }
             }
         }
-        settle(&patch, fits, &mut turn, &mut done);
+        choose_turned(&patch, fits, &mut turn, &mut done);
     }
     for &[first, second] in &facets.two_sided {
         if turn[first as usize] == Some(true) {
@@ -93,7 +92,7 @@ fn patches_of_one_way(surface: &Surface, facets: &mut Facets) -> Option<usize> {
 }
 
 /// Decides which triangles of a patch turn.
-fn settle(patch: &[u32], fits: bool, turn: &mut [Option<bool>], done: &mut Orientation) {
+fn choose_turned(patch: &[u32], fits: bool, turn: &mut [Option<bool>], done: &mut Orientation) {
     let n_turned = patch.iter().filter(|&&t| turn[t as usize] == Some(true)).count();
     let turn_others = 2 * n_turned > patch.len();
     done.n_unorientable += usize::from(!fits);
@@ -105,26 +104,28 @@ fn settle(patch: &[u32], fits: bool, turn: &mut [Option<bool>], done: &mut Orien
 
 /// A neighbor through a manifold edge: `2 * triangle + unlike`.
 #[derive(Clone, Copy)]
-struct Link(u32);
+struct NeighborLink(u32);
 
-impl Link {
+impl NeighborLink {
     fn triangle(self) -> u32 {
         self.0 >> 1
     }
 
-    /// Whether the two run along their edge in the same direction.
+    /// Returns whether the two run along their edge in the same direction.
     fn is_unlike(self) -> bool {
         self.0 & 1 == 1
     }
 }
 
-fn links(surface: &Surface, facets: &mut Facets) -> Vec<[Option<Link>; 3]> {
+fn links(surface: &Surface, facets: &mut Facets) -> Vec<[Option<NeighborLink>; 3]> {
     let mut links = vec![[None; 3]; surface.n_triangles()];
     facets.each_edge(|uses| {
         each_pair(surface, uses, |a, b| {
             let unlike = u32::from(same_direction(surface, a, b));
-            links[a.triangle() as usize][a.corner()] = Some(Link(b.triangle() << 1 | unlike));
-            links[b.triangle() as usize][b.corner()] = Some(Link(a.triangle() << 1 | unlike));
+            links[a.triangle() as usize][a.corner()] =
+                Some(NeighborLink(b.triangle() << 1 | unlike));
+            links[b.triangle() as usize][b.corner()] =
+                Some(NeighborLink(a.triangle() << 1 | unlike));
         });
     });
     links

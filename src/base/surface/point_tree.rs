@@ -1,4 +1,4 @@
-//! Which points lie in a box: a tree of boxes over the Hilbert order.
+//! A tree of boxes over points in Hilbert order, for the points in a box.
 
 use rayon::prelude::*;
 

@@ -1,14 +1,15 @@
-//! Repairs that were asked for: near points joined, useless triangles dropped, T-junctions divided, neighbors turned alike.
+//! Repairs on demand: joins near points, drops useless triangles, divides triangles at T-junctions, turns neighbors
+//! alike.
 
 use std::collections::BTreeMap;
 
 use super::Surface;
 use super::boundary_loops::{TJunction, has_near_junctions, t_junctions};
 use super::edges::{Closedness, Facets, closedness};
-use super::near::{n_near, weld_near};
 use super::orientation::orient_alike;
 use super::validate::validate;
 use super::weld::drop_unused_points;
+use super::weld_near::{n_near, weld_near};
 use crate::storage::ScratchSpace;
 
 /// Shares of the box diagonal that [`closing`] tries after none.
@@ -16,7 +17,7 @@ const CLOSING_SHARES: [f64; 7] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Rounds of dividing at most: each divides one edge of a triangle, at all vertices on it.
 const ROUNDS_MAX: usize = 64;
 
-/// What [`repair`] did.
+/// Result of [`repair`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Repair {
     /// Points joined to another.
@@ -37,7 +38,7 @@ pub fn repair_bytes(surface: &Surface) -> u64 {
     TRIANGLE * surface.n_triangles() as u64
 }
 
-/// Mends what can be mended without a guess.
+/// Repairs everything that needs no guess.
 ///
 /// Joins points not farther apart than `weld` (when given, in input units), drops triangles without area and repeated ones,
 /// divides triangles at vertices that lie on their open edges (exactly, or as near as `weld`), turns neighbors alike.
@@ -46,7 +47,7 @@ pub fn repair(surface: &mut Surface, weld: Option<f64>) -> Repair {
     mend(surface, weld, false)
 }
 
-/// The same; `to_close` says that nothing need be divided where that leaves open edges.
+/// [`repair`] with a choice: with `to_close`, triangles are divided only if that may close the surface.
 fn mend(surface: &mut Surface, weld: Option<f64>, to_close: bool) -> Repair {
     let mut done = Repair::default();
     if let Some(distance) = weld {
@@ -67,7 +68,7 @@ fn mend(surface: &mut Surface, weld: Option<f64>, to_close: bool) -> Repair {
 
 /// Drops triangles without area and repeated ones.
 fn drop_useless(surface: &mut Surface, done: &mut Repair) {
-    let facets = Facets::of(surface, &ScratchSpace::boundless());
+    let facets = Facets::new(surface, &ScratchSpace::boundless());
     let mut drop = vec![false; surface.n_triangles()];
     for &(t, _) in &facets.degenerate {
         drop[t as usize] = true;
@@ -135,7 +136,7 @@ fn divide(surface: &mut Surface, distance: f64, to_close: bool) -> usize {
     cuts.len()
 }
 
-/// Whether dividing may close the surface: each open edge is divided, or an end of it lies on another open edge.
+/// Returns whether dividing may close the surface: each open edge is divided, or an end of it lies on another open edge.
 fn may_close(found: &Closedness, junctions: &[TJunction]) -> bool {
     let mut on_edge: Vec<u32> = junctions.iter().map(|j| j.vertex).collect();
     on_edge.sort_unstable();
@@ -146,7 +147,7 @@ fn may_close(found: &Closedness, junctions: &[TJunction]) -> bool {
     })
 }
 
-/// Puts what `pieces` gives in the place of each triangle; labels and files follow.
+/// Replaces each triangle by the output of `pieces`; labels and files follow.
 fn replace(surface: &mut Surface, pieces: impl Fn(u32, [u32; 3], &mut Vec<[u32; 3]>)) {
     let old = std::mem::take(&mut surface.triangles);
     let old_labels = std::mem::take(&mut surface.labels);
@@ -163,12 +164,12 @@ fn replace(surface: &mut Surface, pieces: impl Fn(u32, [u32; 3], &mut Vec<[u32; 
     }
 }
 
-/// What a repair would do to an open surface.
+/// Result of a tentative repair of an open surface.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Closing {
     /// Points this near are joined, as a share of the box diagonal; 0 means none.
     pub share: f64,
-    /// The same in input units.
+    /// The distance in input units.
     pub distance: f64,
     /// Points that would be joined to others.
     pub points_joined: usize,
@@ -182,8 +183,8 @@ pub struct Closing {
 
 /// Tries [`repair`] without joining points, then with growing distances, until no edge is open.
 ///
-/// The last entry tells whether one was enough. A distance at which no points are joined and no vertex comes to lie on an
-/// open edge leaves what no distance leaves, and is not tried.
+/// The last entry says whether one distance was enough. A distance is skipped if it joins no points and puts no vertex
+/// on an open edge: the result would be that without joining.
 pub fn closing(surface: &Surface) -> Vec<Closing> {
     let diagonal = surface.bounds().diagonal();
     let (first, unjoined) = try_closing(surface, None);
@@ -211,7 +212,7 @@ pub fn closing(surface: &Surface) -> Vec<Closing> {
     tried
 }
 
-/// What [`repair`] makes of the surface, and the outcome, whose share is left to the caller.
+/// The repaired surface and its outcome. The caller sets the outcome's share.
 fn try_closing(surface: &Surface, weld: Option<f64>) -> (Closing, Surface) {
     let mut joined = surface.clone();
     let done = mend(&mut joined, weld, true);

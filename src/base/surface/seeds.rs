@@ -1,24 +1,24 @@
-//! Points that say what the volume around them is: a region with a name, or a hole.
+//! Points that mark the volume around them as a region with a name, or as a hole.
 
 use std::fmt;
 
 use crate::geom::Point;
 
-/// A point inside a volume, and what it says of it.
+/// A point inside a volume, and its meaning for the volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seed {
-    /// Where it is.
+    /// Position of the seed.
     pub point: Point,
-    /// What it says.
+    /// Region or hole.
     pub kind: SeedKind,
 }
 
-/// What a [`Seed`] says of the volume around it.
+/// Meaning of a [`Seed`] for the volume around it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SeedKind {
-    /// It is filled, and called so.
+    /// A filled volume, with its name.
     Region(Option<String>),
-    /// It stays empty.
+    /// A hole: the volume stays empty.
     Hole,
 }
 

@@ -1,31 +1,31 @@
-//! Embedded sheets: triangles that become faces of the mesh with volume on both sides, and part nothing.
+//! Embedded sheets: triangles that become faces of the mesh with the same volume on both sides.
 
-use super::edges::{EdgeUse, Facets};
+use super::edges::{Facets, TriangleAtEdge};
 use super::weld::{PointTable, drop_unused_labels, drop_unused_points};
 use super::{SourceFile, Surface, SurfaceError};
 use crate::storage::ScratchSpace;
 
 impl Surface {
-    /// Whether triangle `t` is part of an embedded sheet.
+    /// Returns whether triangle `t` is part of an embedded sheet.
     #[inline]
     pub fn is_sheet(&self, t: u32) -> bool {
         self.sheets.get(t as usize).is_some_and(|&is_sheet| is_sheet)
     }
 
-    /// Whether it has embedded sheets.
+    /// Returns whether it has embedded sheets.
     pub fn has_sheets(&self) -> bool {
         !self.sheets.is_empty()
     }
 
     /// Triangles of embedded sheets.
     pub fn n_sheet_triangles(&self) -> usize {
-        let own = self.sheets.iter().take(self.n_own_triangles());
+        let own = self.sheets.iter().take(self.n_input_triangles());
         own.filter(|&&is_sheet| is_sheet).count()
     }
 
-    /// The sheets alone, as triangles like others, or what they are in.
+    /// A surface of the sheets alone, as ordinary triangles, or of the other triangles.
     pub fn part(&self, sheets: bool) -> Self {
-        let mut part = self.without_wires();
+        let mut part = self.without_embedded();
         let flags = std::mem::take(&mut part.sheets);
         let is_kept = |t: usize| flags.get(t).copied().unwrap_or(false) == sheets;
         let mut kept = (0..part.n_triangles()).map(is_kept);
@@ -61,7 +61,7 @@ impl Surface {
     /// [`SurfaceError::TooLarge`] beyond 2^30 vertices or triangles.
     pub fn embed(&mut self, other: &Self, name: &str) -> Result<(), SurfaceError> {
         let first = self.n_triangles();
-        let mut table = PointTable::of(&self.points);
+        let mut table = PointTable::new(&self.points);
         let mut verts = Vec::with_capacity(other.points.len());
         for &p in &other.points {
             verts.push(table.find_or_add(p, &mut self.points));
@@ -100,11 +100,11 @@ impl Surface {
         first
     }
 
-    /// Takes for sheets what is not closed: triangles at an open edge, then those that are at one without them, and so on.
+    /// Turns triangles at open edges into sheets, then those at the edges that are open without them, and so on.
     ///
     /// Returns how many. Memory: 24 bytes a triangle. A scratch file that fails unwinds.
-    pub fn open_parts_to_sheets(&mut self, room: &ScratchSpace) -> usize {
-        let mut edges = OpenEdges::of(self, room);
+    pub fn open_parts_to_sheets(&mut self, scratch: &ScratchSpace) -> usize {
+        let mut edges = OpenEdges::new(self, scratch);
         let mut n = 0;
         while let Some(t) = edges.next() {
             if self.sheets.is_empty() {
@@ -120,9 +120,9 @@ impl Surface {
 
 /// Edges of shells with the number of their triangles, while triangles go.
 struct OpenEdges {
-    /// Of each triangle; those left out have none.
+    /// Edges of each triangle; triangles that are left out have none.
     edges: Vec<[u32; 3]>,
-    /// How many triangles an edge has, and their numbers added bit by bit: of one triangle, its number.
+    /// For each edge the number of its triangles, and the XOR of their numbers: for one triangle, its number.
     uses: Vec<(u32, u32)>,
     open: Vec<u32>,
 }
@@ -130,10 +130,10 @@ struct OpenEdges {
 const NO_EDGE: u32 = u32::MAX;
 
 impl OpenEdges {
-    fn of(surface: &Surface, room: &ScratchSpace) -> Self {
+    fn new(surface: &Surface, scratch: &ScratchSpace) -> Self {
         let mut edges = vec![[NO_EDGE; 3]; surface.n_triangles()];
         let mut uses = Vec::new();
-        Facets::of(surface, room).each_edge(|all| {
+        Facets::new(surface, scratch).each_edge(|all| {
             let mut here = (0, 0);
             for use_ in all.iter().filter(|u| !surface.is_sheet(u.triangle())) {
                 edges[use_.triangle() as usize][use_.corner()] = uses.len() as u32;
@@ -171,8 +171,8 @@ impl OpenEdges {
 /// Calls `visit` with the two shell triangles at an edge if there are two, then with the two sheet triangles.
 pub(super) fn each_pair(
     surface: &Surface,
-    uses: &[EdgeUse],
-    mut visit: impl FnMut(EdgeUse, EdgeUse),
+    uses: &[TriangleAtEdge],
+    mut visit: impl FnMut(TriangleAtEdge, TriangleAtEdge),
 ) {
     if !surface.has_sheets() {
         if let [a, b] = uses {

@@ -20,14 +20,14 @@ const LONG: f64 = std::f64::consts::SQRT_2;
 const INSIDE: f64 = 0.7;
 /// Passes of swaps end after this many even if they still gain.
 const SWAP_PASSES: u32 = 12;
-/// Triangles have 32-bit numbers; a wanted length that asks for more is refused before memory is.
+/// Triangles have 32-bit numbers; a wanted length that needs more is refused before memory runs out.
 const TRIANGLES_MAX: usize = 1 << 30;
 
 /// Bytes held for a triangle: itself, its input triangle, and one and a half edges in a table that doubles. Measured with the sizes it is divided by:
 /// 226 to 235.
 const BYTES_TRIANGLE: u64 = 240;
 
-/// What was done.
+/// Counts of a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SplitReport {
     /// Edges divided.
@@ -39,17 +39,18 @@ pub struct SplitReport {
 }
 
 /// An edge as its vertices, the smaller first.
-type Edge = (u32, u32);
+type EdgeKey = (u32, u32);
 
-fn edge(a: u32, b: u32) -> Edge {
+fn edge(a: u32, b: u32) -> EdgeKey {
     (a.min(b), a.max(b))
 }
 
-/// Divides the triangles of `surface`; `h` tells the wanted edge length at a position.
+/// Divides the triangles of `surface`; `h` is the wanted edge length at a position.
 ///
-/// New triangles keep label and orientation; they stand in the place of the triangle they came from and behind the others. Edges of wires
-/// are divided with those of triangles; what holds them goes, see [`Surface::hold_wires`].
-/// Memory: `bytes_max` at most. Errors: more triangles than fit it, or than can be numbered.
+/// New triangles keep label and orientation. They stand in the place of the triangle they came from and behind the
+/// others. Embedded edges are divided with the triangles at them; support triangles are dropped, see
+/// [`Surface::add_support_triangles`]. Memory: `bytes_max` at most. Errors: more triangles than fit, or than can be
+/// numbered.
 pub fn split(
     surface: &Surface,
     h: &dyn Fn(Point) -> f64,
@@ -65,11 +66,11 @@ pub fn split(
     };
     fits(surface)?;
     let mut plain = surface.clone();
-    plain.drop_fins();
+    plain.drop_support_triangles();
     let parent = (0..plain.triangles.len() as u32).collect();
     let mut splitter = Splitter::new(plain, parent, |_| true);
     let mut heap = BinaryHeap::new();
-    let edges: Vec<Edge> = splitter.around.keys().copied().collect();
+    let edges: Vec<EdgeKey> = splitter.around.keys().copied().collect();
     for e in edges {
         splitter.consider(e, h, &mut heap);
     }
@@ -90,8 +91,8 @@ pub fn split(
     Ok((splitter.surface, splitter.report))
 }
 
-/// Swaps edges inside the triangles that `is_divided` where that makes the least angle larger; `parent`: of each triangle the one it is a
-/// part of. Those of wires stay.
+/// Swaps edges inside the triangles for which `is_divided` holds, if that raises the least angle. `parent`: the
+/// triangle that each triangle is a part of. Embedded edges stay.
 pub(super) fn swap_inside(
     surface: Surface,
     parent: Vec<u32>,
@@ -106,28 +107,28 @@ struct Splitter {
     surface: Surface,
     /// Input triangle of each triangle.
     parent: Vec<u32>,
-    around: IdMap<Edge, Vec<u32>>,
-    /// Edges of wires, by their places among these. They are not swapped, and divided with the triangles they are edges of.
-    wires: IdMap<Edge, usize>,
+    around: IdMap<EdgeKey, Vec<u32>>,
+    /// Embedded edges, with their positions in the list. They are not swapped, and are divided with their triangles.
+    embedded: IdMap<EdgeKey, usize>,
     report: SplitReport,
 }
 
-/// Lengths as bits, which order as they do, for positive numbers.
-type Ordered = (u64, Reverse<Edge>);
+/// Length as bits, which order like the positive numbers they represent.
+type Ordered = (u64, Reverse<EdgeKey>);
 
 impl Splitter {
-    /// Knows the edges of those triangles whose parents `is_meant`.
+    /// A splitter over the edges of the triangles whose parents `is_meant` accepts.
     fn new(surface: Surface, parent: Vec<u32>, is_meant: impl Fn(u32) -> bool) -> Self {
-        let mut around: IdMap<Edge, Vec<u32>> = IdMap::default();
+        let mut around: IdMap<EdgeKey, Vec<u32>> = IdMap::default();
         let triangles = (0u32..).zip(&surface.triangles);
         for (t, &[a, b, c]) in triangles.filter(|(t, _)| is_meant(parent[*t as usize])) {
             for e in [edge(a, b), edge(b, c), edge(c, a)] {
                 around.entry(e).or_default().push(t);
             }
         }
-        let wires = surface.wires.edges.iter().map(|&[a, b, _]| edge(a, b));
+        let wires = surface.embedded.edges.iter().map(|&[a, b, _]| edge(a, b));
         Self {
-            wires: wires.zip(0..).collect(),
+            embedded: wires.zip(0..).collect(),
             surface,
             parent,
             around,
@@ -139,7 +140,7 @@ impl Splitter {
         self.surface.points[v as usize]
     }
 
-    fn consider(&self, e: Edge, h: &dyn Fn(Point) -> f64, heap: &mut BinaryHeap<Ordered>) {
+    fn consider(&self, e: EdgeKey, h: &dyn Fn(Point) -> f64, heap: &mut BinaryHeap<Ordered>) {
         let (a, b) = (self.point(e.0), self.point(e.1));
         let length = a.distance(b) / h((a + b) * 0.5);
         if length > LONG {
@@ -148,8 +149,8 @@ impl Splitter {
         }
     }
 
-    /// Whether the triangles at an edge are parts of one input triangle.
-    fn is_inside(&self, e: Edge) -> bool {
+    /// Returns whether the triangles at an edge are parts of one input triangle.
+    fn is_inside(&self, e: EdgeKey) -> bool {
         match self.around.get(&e).map(Vec::as_slice) {
             Some(&[x, y]) => self.parent[x as usize] == self.parent[y as usize],
             _ => false,
@@ -157,7 +158,7 @@ impl Splitter {
     }
 
     /// Swaps `e`, if it is inside an input triangle and that raises the least angle; returns the new edge.
-    fn swap_edge(&mut self, e: Edge) -> Option<Edge> {
+    fn swap_edge(&mut self, e: EdgeKey) -> Option<EdgeKey> {
         let &t = self.around.get(&e)?.first()?;
         let corners = self.surface.triangles[t as usize];
         let k = (0..3).find(|&k| edge(corners[k], corners[(k + 1) % 3]) == e)?;
@@ -165,7 +166,7 @@ impl Splitter {
     }
 
     /// Divides every triangle at `e`, if it is still there.
-    fn divide(&mut self, e: Edge, h: &dyn Fn(Point) -> f64, heap: &mut BinaryHeap<Ordered>) {
+    fn divide(&mut self, e: EdgeKey, h: &dyn Fn(Point) -> f64, heap: &mut BinaryHeap<Ordered>) {
         let Some(triangles) = self.around.remove(&e) else {
             return;
         };
@@ -180,10 +181,10 @@ impl Splitter {
         let mut opposite = Vec::new();
         let m = self.surface.points.len() as u32;
         self.surface.points.push(middle);
-        if let Some(i) = self.wires.remove(&e) {
-            let wires = &mut self.surface.wires.edges;
+        if let Some(i) = self.embedded.remove(&e) {
+            let wires = &mut self.surface.embedded.edges;
             let [from, to, label] = wires[i];
-            self.wires.extend([(edge(from, m), i), (edge(m, to), wires.len())]);
+            self.embedded.extend([(edge(from, m), i), (edge(m, to), wires.len())]);
             wires[i] = [from, m, label];
             wires.push([m, to, label]);
         }
@@ -222,7 +223,7 @@ impl Splitter {
     fn swap_around(
         &mut self,
         m: u32,
-        mut opposite: Vec<Edge>,
+        mut opposite: Vec<EdgeKey>,
         h: &dyn Fn(Point) -> f64,
         heap: &mut BinaryHeap<Ordered>,
     ) {
@@ -252,13 +253,13 @@ impl Splitter {
     }
 
     /// Swaps the edge from corner `k` of a triangle to the next, under the conditions of [`Splitter::swap_edge`]; returns the new one.
-    fn swap(&mut self, t: u32, k: usize) -> Option<Edge> {
+    fn swap(&mut self, t: u32, k: usize) -> Option<EdgeKey> {
         let corners = self.surface.triangles[t as usize];
         let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
         let &[x, y] = self.around.get(&edge(a, b))?.as_slice() else {
             return None;
         };
-        if self.wires.contains_key(&edge(a, b)) {
+        if self.embedded.contains_key(&edge(a, b)) {
             return None;
         }
         let other = if x == t { y } else { x };
@@ -274,7 +275,7 @@ impl Splitter {
             let angles = triangles.map(|t| self.least_sine(t));
             angles[0].min(angles[1])
         };
-        // Of the quadrilateral a d b c, the other diagonal; both triangles must turn as the old ones do.
+        // The other diagonal of the quadrilateral a d b c; both new triangles must turn as the old ones do.
         let (old, new) = ([[a, b, c], [b, a, d]], [[a, d, c], [d, b, c]]);
         let normal = self.normal([a, b, c]);
         if new.iter().any(|&t| self.normal(t).dot(normal) <= 0.0)

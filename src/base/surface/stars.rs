@@ -1,4 +1,4 @@
-//! Triangles around one vertex or one edge that are too many to look at in pairs.
+//! Triangles at one vertex or one edge, if they are too many to test in pairs.
 //!
 //! ```text
 //!        \ | /         All boxes around the middle of a fan overlap, but seen from the middle each triangle takes up a
@@ -14,12 +14,13 @@ use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
-use super::broad::{FOUND_MAX, tree_of};
+use super::box_pairs::{FOUND_MAX, tree_of};
 use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
 
-/// Triangles at a vertex or an edge that make a star: some ten thousand pairs are looked at as before. Not tuned.
+/// Triangles at a vertex or an edge that make a star. Below it some ten thousand pairs are tested one by one. Not
+/// tuned.
 const STAR_MIN: u32 = 256;
 /// Beyond the error of a direction's three roundings.
 const PAD: f64 = 1e-14;
@@ -29,10 +30,10 @@ const ROUNDED: f64 = 1e-10;
 const NEAR_TURN: f64 = 0.05;
 /// A direction this near to the end of an arc counts as on it.
 const NEAR_END: f64 = 1e-9;
-/// Triangles beside a star that are looked at between two looks at how much was found.
+/// Triangles near a star that are tested between two checks of the number found.
 const AT_ONCE: usize = 1 << 14;
 
-/// What the triangles of a star share.
+/// The common vertex or edge of a star.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Center {
     Vertex(u32),
@@ -40,31 +41,31 @@ enum Center {
 }
 
 /// Triangles with a center in common.
-struct Star {
-    /// Of the edge they share, or the vertex twice.
+struct TriangleStar {
+    /// Ends of the common edge, or the common vertex twice.
     ends: [Point; 2],
     /// Direction of the edge, if it is one.
     axis: Option<Point>,
     members: Vec<u32>,
     /// Around its triangles.
     bounds: Aabb,
-    /// Of their directions, numbered as `members`.
+    /// Tree over their directions, numbered as `members`.
     tree: BoxTree,
 }
 
-/// Calls `test` on each pair of triangles that may touch, the lower number first, and collects what it returns.
+/// Calls `test` on each pair of triangles that may touch, the lower number first, and collects its results.
 ///
 /// `is_left_out`: triangles that do not count; those of stars are added. As [`BoxTree::pairs`] else. Memory: 4 bytes a vertex, and 60 bytes for
 /// each triangle of a star.
 pub(super) fn touching<T: Send>(
     surface: &Surface,
     is_left_out: &mut [bool],
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
     listed_max: usize,
     test: impl Fn(u32, u32) -> Option<T> + Sync,
 ) -> (Vec<T>, u64) {
     let stars = stars(surface, is_left_out);
-    let tree = tree_of(surface, room, |t| !is_left_out[t as usize]);
+    let tree = tree_of(surface, scratch, |t| !is_left_out[t as usize]);
     let (mut listed, mut n_found) = tree.pairs(listed_max, &test);
     let mut add = |(found, n): (Vec<T>, u64)| {
         let free = listed_max - listed.len();
@@ -77,16 +78,16 @@ pub(super) fn touching<T: Send>(
         if add(star.tree.pairs(listed_max, own)) {
             break;
         }
-        let mut beside = Vec::new();
-        tree.meeting(&star.bounds, |t| beside.push(t));
+        let mut adjacent = Vec::new();
+        tree.meeting(&star.bounds, |t| adjacent.push(t));
         for other in &stars[k + 1..] {
             if other.bounds.meets(&star.bounds) {
-                beside.extend(&other.members);
+                adjacent.extend(&other.members);
             }
         }
-        let is_hopeless =
-            beside.chunks(AT_ONCE).any(|some| add(star.with(surface, some, listed_max, &test)));
-        if is_hopeless {
+        let is_over_limit =
+            adjacent.chunks(AT_ONCE).any(|some| add(star.with(surface, some, listed_max, &test)));
+        if is_over_limit {
             break;
         }
     }
@@ -94,7 +95,7 @@ pub(super) fn touching<T: Send>(
 }
 
 /// The stars of a surface, by vertex and edge; their triangles are left out from now on.
-fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<Star> {
+fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<TriangleStar> {
     let mut degrees = vec![0u32; surface.n_vertices()];
     let counts = |t: &usize| !is_left_out[*t];
     for t in (0..surface.n_triangles()).filter(counts) {
@@ -139,11 +140,11 @@ fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<Star> {
             centers[k].1.push(t as u32);
         }
     }
-    let star = |(center, members)| Star::new(surface, center, members);
+    let star = |(center, members)| TriangleStar::new(surface, center, members);
     centers.into_iter().map(star).collect()
 }
 
-impl Star {
+impl TriangleStar {
     fn new(surface: &Surface, center: Center, members: Vec<u32>) -> Self {
         let at = |v: u32| surface.points[v as usize];
         let ends = match center {
@@ -166,7 +167,8 @@ impl Star {
 
     /// In which directions a triangle is seen.
     ///
-    /// A corner in the center has none, and needs none: what is between it and the others is seen as they are.
+    /// A corner in the center has no direction and needs none: points between it and the other corners have their
+    /// directions.
     fn directions(&self, corners: [Point; 3]) -> Aabb {
         let (mut seen, mut n, mut pad) = ([Point::ZERO; 3], 0, PAD);
         for p in corners.into_iter().filter(|p| !self.ends.contains(p)) {
@@ -176,7 +178,7 @@ impl Star {
                 None => away,
             };
             let length = across.length();
-            // What rounding leaves of a point on the axis has no direction.
+            // A point on the axis has no direction beyond rounding.
             if length <= ROUNDED * away.length() {
                 return EVERYWHERE;
             }
@@ -229,12 +231,12 @@ fn angle(u: Point, v: Point) -> f64 {
     u.dot(v).clamp(-1.0, 1.0).acos()
 }
 
-/// Whether the arc between two directions is well below half a turn.
+/// Returns whether the arc between two directions is well below half a turn.
 fn is_short(u: Point, v: Point) -> bool {
     angle(u, v) < PI - NEAR_TURN
 }
 
-/// Whether three directions do not surround the center.
+/// Returns whether three directions do not surround the center.
 fn is_in_sight([u, v, w]: [Point; 3]) -> bool {
     let angles = [angle(u, v), angle(v, w), angle(w, u)];
     angles.iter().all(|a| *a < PI - NEAR_TURN) && angles.iter().sum::<f64>() < TAU - NEAR_TURN
@@ -247,7 +249,7 @@ fn around_arc(u: Point, v: Point) -> Aabb {
         return bounds;
     };
     for axis in [Point::X, Point::Y, Point::Z] {
-        // Where the whole circle is farthest along the axis, which may be between the two.
+        // Point of the whole circle that is farthest along the axis; it may lie between the two.
         let top = axis - normal * axis.dot(normal);
         let Some(top) = top.try_normalize().filter(|_| top.length() > NEAR_END) else {
             // Nowhere is it off zero by more; the direction would be rounding.
@@ -264,7 +266,7 @@ fn around_arc(u: Point, v: Point) -> Aabb {
     bounds
 }
 
-/// The box around what is between three directions.
+/// The box around the region between three directions.
 fn around_triangle([u, v, w]: [Point; 3]) -> Aabb {
     let arcs = [around_arc(u, v), around_arc(v, w), around_arc(w, u)];
     let mut bounds = arcs.into_iter().fold(Aabb::EMPTY, |a, b| a.union(b));
@@ -305,12 +307,12 @@ mod tests {
         builder.finish()
     }
 
-    /// Pairs that touch as far as they are listed, how many there are, and how many were looked at.
+    /// Pairs that touch and are listed, their total, and the number of pairs tested.
     fn found(surface: &Surface) -> (Vec<[u32; 2]>, u64, u64) {
         let looked = AtomicU64::new(0);
         let mut is_left_out = vec![false; surface.n_triangles()];
-        let room = ScratchSpace::boundless();
-        let (mut pairs, n) = touching(surface, &mut is_left_out, &room, usize::MAX, |a, b| {
+        let scratch = ScratchSpace::boundless();
+        let (mut pairs, n) = touching(surface, &mut is_left_out, &scratch, usize::MAX, |a, b| {
             looked.fetch_add(1, Ordering::Relaxed);
             contact_of(surface, a, b).then_some([a, b])
         });
@@ -359,7 +361,7 @@ mod tests {
         (0..n).map(|i| [a, b, on_circle(i, n, 0.5)]).collect()
     }
 
-    /// Two cones with a common rim, each around its tip.
+    /// Two cones with a common base circle, each a star around its tip.
     fn cones(n: usize) -> Vec<[Point; 3]> {
         let tips = [Point::Z, Point::Z * -0.5];
         let rim = |i: usize| on_circle(i % n, n, 0.0);

@@ -1,4 +1,4 @@
-//! Cubes that touch, cross, lack a face: what is accepted and what is not.
+//! Cubes that touch, cross, or lack a face: accepted and refused surfaces.
 
 use super::*;
 use crate::geom::Point;
@@ -306,7 +306,7 @@ fn a_t_junction_is_divided() {
     assert_eq!((done.divided, done.turned), (1, 0));
     assert!(validate(&surface).is_valid());
     assert_eq!(surface.n_triangles(), 16);
-    // The same seam closed by triangles without area: dropping them opens it, dividing closes it.
+    // The seam closed by triangles without area: dropping them opens it, dividing closes it.
     triangles.extend([[b, middles[1], middles[0]], [b, c, middles[1]]]);
     let mut surface = build(triangles);
     assert_eq!(codes(&surface)[0], "degenerate-triangle");
@@ -413,13 +413,13 @@ fn a_room_too_small_changes_nothing() {
         let narrow = ScratchSpace::new(16 << 10, dir.path());
         assert!(surface.bytes() as u64 > narrow.cap());
         let validation = validate(&surface);
-        assert_eq!(validate_in(&surface, &narrow), validation);
+        assert_eq!(validate_with(&surface, &narrow), validation);
         let (mut a, mut b) = (surface.clone(), surface);
-        assert_eq!(orient_alike(&mut a), orient_alike_in(&mut b, &narrow));
+        assert_eq!(orient_alike(&mut a), orient_alike_with(&mut b, &narrow));
         assert_eq!(a, b);
-        let seeker = Seeker::of(&a, &narrow, |_| true);
+        let seeker = Seeker::with_filter(&a, &narrow, |_| true);
         let wide = Seeker::new(&a);
-        assert_eq!(Volumes::of_in(&seeker, &narrow), Volumes::of(&wide));
+        assert_eq!(EnclosedVolumes::new_in(&seeker, &narrow), EnclosedVolumes::new(&wide));
         for k in 0..500 {
             let p = Point::new(f64::from(k * 7 % 61), f64::from(k * 11 % 61), 0.3);
             assert_eq!(seeker.distance(p, 9.0), wide.distance(p, 9.0));

@@ -4,16 +4,16 @@ use std::fmt;
 use std::mem::size_of;
 
 use super::Seed;
-use super::wire_set::Wires;
+use super::embedded_set::Embedded;
 use crate::geom::{Aabb, Point};
 
 /// An indexed triangle surface with a label on each triangle.
 ///
-/// Shape: `labels` runs parallel to `triangles` and indexes `label_names`; a triangle's position is
-/// its input id: file order, polygons fanned from their first vertex, files one after the other.
-/// Invariant (when made by [`SurfaceBuilder`](super::SurfaceBuilder)): points are finite, pairwise
-/// different, free of −0.0, each used by a triangle or a wire, in order of first appearance in the files.
-/// Is not: validated. A triangle may be degenerate, the surface open; see [`validate`](super::validate).
+/// Shape: `labels` runs parallel to `triangles` and indexes `label_names`; a triangle's position is its input id: file
+/// order, polygons fanned from their first vertex, files one after the other. Invariant (of a surface from
+/// [`SurfaceBuilder`](super::SurfaceBuilder)): points are finite, pairwise different and free of −0.0. Each is used by
+/// a triangle or an embedded part. They are in order of first appearance in the files. Is not: validated. A triangle
+/// may be degenerate, the surface open; see [`validate`](super::validate).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     /// Positions of the vertices.
@@ -26,13 +26,13 @@ pub struct Surface {
     pub label_names: Vec<String>,
     /// The files read, in order.
     pub files: Vec<SourceFile>,
-    /// Whether each triangle is part of an embedded sheet; empty where none is.
+    /// True if each triangle is part of an embedded sheet; empty where none is.
     pub sheets: Vec<bool>,
-    /// Embedded edges and points, and what holds them.
-    pub wires: Wires,
-    /// What a reader found worth telling, in order.
+    /// Embedded edges and points, and their support triangles.
+    pub embedded: Embedded,
+    /// Notes of the readers, in order.
     pub notes: Vec<Note>,
-    /// What the files say of volumes, in order.
+    /// Seeds from the files, in order.
     pub seeds: Vec<Seed>,
 }
 
@@ -95,22 +95,22 @@ impl Surface {
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + self.labels.capacity() * size_of::<u32>()
             + self.sheets.capacity()
-            + self.wires.edges.capacity() * size_of::<[u32; 3]>()
-            + self.wires.points.capacity() * size_of::<[u32; 4]>()
+            + self.embedded.edges.capacity() * size_of::<[u32; 3]>()
+            + self.embedded.points.capacity() * size_of::<[u32; 4]>()
             + names
     }
 }
 
-/// Something the reader did or left out that the user may want to know; not an error.
+/// An action or omission of a reader that the user should see; not an error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
     /// The file it is about.
     pub file: String,
-    /// What was done or left out.
+    /// The action or omission.
     pub kind: NoteKind,
 }
 
-/// The things a [`Note`] can tell.
+/// Kinds of a [`Note`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NoteKind {
     /// A text STL ended without `endsolid`.
@@ -125,36 +125,36 @@ pub enum NoteKind {
     },
     /// Vertices that no triangle uses were left out.
     UnusedVertices {
-        /// How many.
+        /// Number of vertices.
         n: u64,
     },
     /// Polygons with more than three corners were cut into fans.
     FannedPolygons {
-        /// How many.
+        /// Number of polygons.
         n: u64,
     },
     /// Elements that are no part of a surface (tetrahedra, lines, …) were left out.
     SkippedElements {
         /// The kind of element.
         what: &'static str,
-        /// How many.
+        /// Number of elements.
         n: u64,
     },
     /// Points that mark holes or regions of the volume.
     VolumePoints {
-        /// What they mark.
+        /// Holes or regions.
         points: VolumePoints,
-        /// How many.
+        /// Number of points.
         n: u64,
     },
     /// A planar facet of several polygons or with holes was taken polygon by polygon.
     SplitFacets {
-        /// How many.
+        /// Number of facets.
         n: u64,
     },
 }
 
-/// What points inside the volume mark.
+/// Meaning of points inside the volume.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VolumePoints {
     /// Volumes to leave empty.

@@ -1,4 +1,4 @@
-//! Exact validation: everything that keeps a surface from bounding volumes, found and listed.
+//! Exact validation: lists everything that keeps a surface from bounding volumes.
 
 use super::boundary_loops::{JUNCTION_SHARE, TJunction, t_junctions};
 #[cfg(test)]
@@ -12,7 +12,7 @@ use crate::storage::ScratchSpace;
 /// Self-intersections listed at most; all are counted.
 const LISTED_MAX: usize = 100_000;
 
-/// What validation found.
+/// Result of a validation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Validation {
     /// Edges, parts, two-sided facets.
@@ -28,7 +28,7 @@ pub struct Validation {
 }
 
 impl Validation {
-    /// Whether the surface may be meshed.
+    /// Returns whether the surface may be meshed.
     pub fn is_valid(&self) -> bool {
         self.n_defects == 0
     }
@@ -47,7 +47,7 @@ impl Validation {
         }
     }
 
-    /// How many listed self-intersections are of this kind.
+    /// Number of listed self-intersections of this kind.
     #[cfg(test)]
     pub fn n_of_kind(&self, kind: ContactKind) -> usize {
         let is_kind =
@@ -61,14 +61,14 @@ impl Validation {
 /// Near-linear time where boxes of triangles overlap few others, but for those around one vertex or one edge, of which there may be many; about 150 bytes per triangle. Same
 /// result for any number of threads. Orientation is no defect: see [`Closedness::n_inconsistent`].
 pub fn validate(surface: &Surface) -> Validation {
-    validate_in(surface, &ScratchSpace::boundless())
+    validate_with(surface, &ScratchSpace::boundless())
 }
 
-/// [`validate`] in a room: 8 bytes a triangle are held beside the surface and 60 for each around a vertex of hundreds, the rest goes to scratch files where the room is too small.
+/// [`validate`] within scratch space. Memory outside it: 8 bytes a triangle, and 60 for each triangle of a star.
 ///
 /// A scratch file that fails unwinds ([`attempt`](crate::storage::attempt)).
-pub fn validate_in(surface: &Surface, room: &ScratchSpace) -> Validation {
-    let mut facets = Facets::of(surface, room);
+pub fn validate_with(surface: &Surface, scratch: &ScratchSpace) -> Validation {
+    let mut facets = Facets::new(surface, scratch);
     let closedness = facets.closedness(surface);
     let t_junctions = match closedness.is_closed() {
         true => Vec::new(),
@@ -85,7 +85,7 @@ pub fn validate_in(surface: &Surface, room: &ScratchSpace) -> Validation {
         Some(([a, b], found))
     };
     let (mut touching, n_intersections) =
-        touching(surface, &mut is_left_out, room, LISTED_MAX, look);
+        touching(surface, &mut is_left_out, scratch, LISTED_MAX, look);
     touching.sort_unstable_by_key(|(triangles, _)| *triangles);
     let n_defects = defects.len() as u64 + n_intersections;
     defects.extend(touching.into_iter().map(|(triangles, found)| Defect::SelfIntersection {
@@ -132,7 +132,7 @@ fn edge_defects(
             Defect::OpenEdge { triangle, vertices, from, to, junction }
         })
         .collect();
-    // Where the reason is known comes first.
+    // Edges with a known reason come first.
     open.sort_by_key(|d| !matches!(d, Defect::OpenEdge { junction: Some(_), .. }));
     defects.extend(open);
     defects

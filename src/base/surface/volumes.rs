@@ -1,4 +1,4 @@
-//! The volumes a surface encloses, told from its triangles alone.
+//! The volumes that a surface encloses, found from its triangles alone.
 //!
 //! ```text
 //!        \   t2        Around an edge the triangles follow each other by exact signs; between two of them
@@ -11,8 +11,8 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Surface;
-use super::edges::{EdgeUse, Facets, Groups};
-use super::seek::Seeker;
+use super::edges::{Facets, Groups, TriangleAtEdge};
+use super::seeker::Seeker;
 use crate::geom::{Point, orient_sign};
 use crate::storage::ScratchSpace;
 
@@ -22,7 +22,7 @@ pub const VOLUMES_TRIANGLE: usize = 13;
 /// The number of the unbounded volume.
 pub const OUTSIDE: u32 = 0;
 
-/// How two volumes meet: triangles whose front looks into the lower-numbered one, and the others.
+/// The wall between two volumes: triangles whose front faces the lower-numbered one, and the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wall {
     /// Triangles whose front looks into the lower-numbered volume.
@@ -36,27 +36,28 @@ pub struct Wall {
 /// Invariant: volume 0 is the unbounded one; the others are numbered by the first triangle at each, as the regions of the mesh are.
 /// Two triangles that are the two sides of one wall are both listed, with the same volumes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Volumes {
-    /// Of each triangle: the volume in front, the volume behind.
+pub struct EnclosedVolumes {
+    /// For each triangle: the volume in front, the volume behind.
     pub of_side: Vec<[u32; 2]>,
     /// Number of volumes, the unbounded one included.
     pub n_volumes: u32,
-    /// Of each volume: the sum of its angles at edges, in radians, known to a hundredth each.
+    /// For each volume: the sum of its angles at edges in radians; each angle is correct to a hundredth.
     pub angles: Vec<f64>,
 }
 
-impl Volumes {
-    /// [`Volumes::of_in`] in memory.
-    pub fn of(seeker: &Seeker) -> Self {
-        Self::of_in(seeker, &ScratchSpace::boundless())
+impl EnclosedVolumes {
+    /// [`EnclosedVolumes::new_in`] in memory.
+    pub fn new(seeker: &Seeker) -> Self {
+        Self::new_in(seeker, &ScratchSpace::boundless())
     }
 
-    /// Sides at open edges are joined, so an open surface encloses nothing. Beside the room's arrays [`VOLUMES_TRIANGLE`] bytes a triangle are held at
-    /// most, which the caller counts; a scratch file that fails unwinds.
-    pub fn of_in(seeker: &Seeker, room: &ScratchSpace) -> Self {
+    /// Identifies the volumes within scratch space. Sides at open edges are joined, so an open surface encloses
+    /// nothing. Memory outside the scratch space: [`VOLUMES_TRIANGLE`] bytes a triangle, which the caller leases. A
+    /// scratch file that fails unwinds.
+    pub fn new_in(seeker: &Seeker, scratch: &ScratchSpace) -> Self {
         let surface = seeker.surface();
         let n = surface.n_triangles();
-        let mut facets = Facets::of(surface, room);
+        let mut facets = Facets::new(surface, scratch);
         let mut sides = Groups::new(2 * n + 1);
         let mut shells = Groups::new(n);
         facets.each_edge(|uses| {
@@ -85,7 +86,8 @@ impl Volumes {
                 below = up;
             }
             sides.join(below, outside);
-            // A sheet that is upright, or as good as, is on no line along z; what it lies in is what lies above its middle.
+            // A sheet that is upright, or nearly, is on no line along z. It lies in the volume below the crossing above
+            // its middle.
             if surface.is_sheet(t) && crossings.iter().all(|c| c.triangle != t) {
                 let above = crossings.iter().find(|c| c.z > line.z);
                 sides.join(2 * t, above.map_or(outside, |c| c.sides()[0]));
@@ -96,7 +98,7 @@ impl Volumes {
         volumes
     }
 
-    /// Which volumes meet, and by how many triangles; those with one volume on both sides are no walls.
+    /// Pairs of volumes with a common wall, and its triangles; triangles with one volume on both sides are no wall.
     pub fn walls(&self) -> BTreeMap<(u32, u32), Wall> {
         let mut walls: BTreeMap<(u32, u32), Wall> = BTreeMap::new();
         for &[front, back] in self.of_side.iter().filter(|[f, b]| f != b) {
@@ -110,7 +112,7 @@ impl Volumes {
         walls
     }
 
-    /// How many triangles must be crossed from the outside to each volume.
+    /// Number of walls between the outside and each volume.
     pub fn depths(&self) -> Vec<u32> {
         let mut depths = vec![u32::MAX; self.n_volumes as usize];
         depths[OUTSIDE as usize] = 0;
@@ -157,7 +159,7 @@ impl Volumes {
         })
     }
 
-    fn add_angles(&mut self, surface: &Surface, uses: &[EdgeUse]) {
+    fn add_angles(&mut self, surface: &Surface, uses: &[TriangleAtEdge]) {
         for [this, next] in pairs_around(surface, uses) {
             let side = this.side_after(surface) as usize;
             let volume = self.of_side[side / 2][side % 2];
@@ -171,14 +173,14 @@ impl Volumes {
 }
 
 /// Joins the sides that face each other around one edge.
-fn join_around(surface: &Surface, uses: &[EdgeUse], sides: &mut Groups) {
+fn join_around(surface: &Surface, uses: &[TriangleAtEdge], sides: &mut Groups) {
     for [this, next] in pairs_around(surface, uses) {
         sides.join(this.side_after(surface), next.side_before(surface));
     }
 }
 
 /// Triangles that follow each other around an edge.
-fn pairs_around(surface: &Surface, uses: &[EdgeUse]) -> Vec<[EdgeUse; 2]> {
+fn pairs_around(surface: &Surface, uses: &[TriangleAtEdge]) -> Vec<[TriangleAtEdge; 2]> {
     let mut order = uses.to_vec();
     if uses.len() > 2 {
         sort_around(surface, &mut order);
@@ -198,7 +200,7 @@ fn angle(x: f64, y: f64) -> f64 {
     if y < 0.0 { 2.0 * PI - half } else { half }
 }
 
-impl EdgeUse {
+impl TriangleAtEdge {
     /// The side seen when turning on from the triangle, counter-clockwise seen from the edge's larger vertex.
     fn side_after(self, surface: &Surface) -> u32 {
         2 * self.triangle() + u32::from(!self.is_forward(surface))
@@ -224,7 +226,7 @@ impl EdgeUse {
 }
 
 /// Sorts triangles around their edge, counter-clockwise, from the first.
-fn sort_around(surface: &Surface, uses: &mut [EdgeUse]) {
+fn sort_around(surface: &Surface, uses: &mut [TriangleAtEdge]) {
     let [a, b] = uses[0].edge.map(|v| surface.points[v as usize]);
     let first = uses[0].apex(surface);
     // Quarter: the first itself, less than half a turn on, half a turn, more.
@@ -260,11 +262,12 @@ fn lines(surface: &Surface, facets: &Facets, shells: &mut Groups) -> Vec<(Point,
 }
 
 /// The groups of sides with numbers, in the place of their roots: both at once would be the most that is held.
-fn numbered(surface: &Surface, sides: Groups) -> Volumes {
+fn numbered(surface: &Surface, sides: Groups) -> EnclosedVolumes {
     let mut of_side = sides.into_roots();
     let outside = of_side.pop().unwrap_or(OUTSIDE);
     let mut numbers = BTreeMap::from([(outside, OUTSIDE)]);
-    // Of one triangle the volume in front comes first, as the mesh's regions do; sheets bound none.
+    // The volume in front of a triangle is numbered before that behind it, like the mesh's regions; sheets bound no
+    // volume.
     for (side, &root) in (0u32..).zip(&of_side) {
         if !surface.is_sheet(side / 2) {
             let next = numbers.len() as u32;
@@ -276,7 +279,7 @@ fn numbered(surface: &Surface, sides: Groups) -> Volumes {
     }
     let of_side = bytemuck::allocation::cast_slice_box(of_side.into_boxed_slice());
     let n_volumes = numbers.len();
-    Volumes {
+    EnclosedVolumes {
         of_side: of_side.into_vec(),
         n_volumes: n_volumes as u32,
         angles: vec![0.0; n_volumes],
@@ -327,7 +330,7 @@ mod tests {
         for inward in [false, true] {
             let surface = cubes(&[([0.0; 3], 3.0, false), ([1.0; 3], 1.0, inward)]);
             let seeker = Seeker::new(&surface);
-            let volumes = Volumes::of(&seeker);
+            let volumes = EnclosedVolumes::new(&seeker);
             assert_eq!(volumes.n_volumes, 3);
             assert!(volumes.of_side[..12].iter().all(|v| *v == [0, 1]));
             let inner = if inward { [2, 1] } else { [1, 2] };
@@ -354,7 +357,7 @@ mod tests {
         single.triangles.drain(12..14);
         for surface in [whole, single] {
             let seeker = Seeker::new(&surface);
-            let volumes = Volumes::of(&seeker);
+            let volumes = EnclosedVolumes::new(&seeker);
             assert_eq!(volumes.n_volumes, 3);
             let walls = volumes.walls();
             let pairs: Vec<(u32, u32)> = walls.keys().copied().collect();
@@ -380,7 +383,7 @@ mod tests {
             surface.labels.push(0);
         }
         surface.sheets_from(n as usize);
-        let volumes = Volumes::of(&Seeker::new(&surface));
+        let volumes = EnclosedVolumes::new(&Seeker::new(&surface));
         assert_eq!(volumes.n_volumes, 3);
         assert_eq!(volumes.of_side[n as usize..], [[2; 2], [1; 2], [0; 2]]);
     }
@@ -389,7 +392,7 @@ mod tests {
     fn an_open_surface_encloses_nothing() {
         let mut surface = cubes(&[([0.0; 3], 1.0, false)]);
         surface.triangles.pop();
-        assert_eq!(Volumes::of(&Seeker::new(&surface)).n_volumes, 1);
+        assert_eq!(EnclosedVolumes::new(&Seeker::new(&surface)).n_volumes, 1);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Building a surface while files are read: welding, labels, fans.
+//! Builds a surface while files are read: welding, labels, fans.
 
 use std::collections::HashMap;
 
@@ -36,18 +36,18 @@ impl SurfaceBuilder {
         Self::default()
     }
 
-    /// A builder that refuses what it cannot hold in so many bytes.
+    /// A builder that holds at most that many bytes.
     pub fn within(bytes_max: u64) -> Self {
         Self { bytes_max: Some(bytes_max), ..Self::default() }
     }
 
-    /// Bytes held: the surface, and what finds its vertices.
+    /// Bytes held: the surface and the table of its vertices.
     fn bytes(&self) -> u64 {
         let ids = self.file2vert.capacity() + self.table.slots.len();
         (self.surface.bytes() + ids * size_of::<u32>()) as u64
     }
 
-    /// Refuses more than fits; to be asked when something is about to grow.
+    /// Refuses to exceed the memory cap; called before an array grows.
     fn check_bytes(&self) -> Result<(), SurfaceError> {
         match self.bytes_max.filter(|&most| self.bytes() > most) {
             None => Ok(()),
@@ -103,7 +103,7 @@ impl SurfaceBuilder {
         Ok(self.table.find_or_add(p, &mut self.surface.points))
     }
 
-    /// The id of the label called `name`, made when it is new.
+    /// The id of the label `name`, which is added if new.
     pub fn label(&mut self, name: &str) -> u32 {
         if let Some(&id) = self.label_ids.get(name) {
             return id;
@@ -154,7 +154,7 @@ impl SurfaceBuilder {
         self.triangle(ids, label)
     }
 
-    /// Says something of the volume around a point.
+    /// Adds a seed of the volume around a point.
     pub fn seed(&mut self, seed: Seed) {
         self.surface.seeds.push(seed);
     }
@@ -279,16 +279,16 @@ pub(super) struct PointTable {
 }
 
 impl PointTable {
-    /// Of points that are all different.
-    pub(super) fn of(points: &[Point]) -> Self {
-        // Half of what it grows to.
+    /// A table of `points`, which are all different.
+    pub fn new(points: &[Point]) -> Self {
+        // Half of the final size.
         let len = (points.len() + 1).next_power_of_two();
         let mut table = Self { slots: filled(len, 0) };
         table.grow(points);
         table
     }
 
-    pub(super) fn find_or_add(&mut self, p: Point, points: &mut Vec<Point>) -> u32 {
+    pub fn find_or_add(&mut self, p: Point, points: &mut Vec<Point>) -> u32 {
         if points.len() * 2 >= self.slots.len() {
             self.grow(points);
         }

@@ -2,7 +2,7 @@
 
 use super::guard::guarded_in;
 use super::{Error, Store};
-use tetdb_base::expr::{ExprError, Expression, Kind};
+use tetdb_base::expr::{ExprError, ExprKind, Expression};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::RunContext;
 use tetdb_schema::code::Code;
@@ -212,7 +212,7 @@ pub(super) fn condition_of(text: &str) -> Result<Expression, Error> {
             .with_help("such as quality > 6 and region in [1, 2]")
     };
     let condition = Expression::parse(text, &VARIABLES).map_err(wrong)?;
-    if condition.kind() == Kind::Truth {
+    if condition.kind() == ExprKind::Truth {
         return Ok(condition);
     }
     Err(wrong(ExprError { at: 0, message: "this is a number; a condition compares".to_owned() }))

@@ -44,7 +44,7 @@ impl From<SurfaceError> for Error {
                 };
                 error.at(defect.place() + &more)
             }
-            SurfaceError::Wire(wire) => error.at(show(wire.at())),
+            SurfaceError::Embed(wire) => error.at(show(wire.at())),
             _ => error,
         }
     }

@@ -244,7 +244,7 @@ impl Mesher {
             let field = self.sizes.field.as_deref();
             let mut surface = Cow::Borrowed(&self.surface);
             let scratch = scratch_beside(&surface.inner, cap, store)?;
-            attempt(|| surface::validate_in(&surface.inner, &scratch))?.accept()?;
+            attempt(|| surface::validate_with(&surface.inner, &scratch))?.accept()?;
             if options.mesh.refine_surface {
                 divide(surface.to_mut(), &options, field, cap, store, &self.settings)?;
             }
@@ -355,7 +355,7 @@ impl Mesher {
     /// Divides the triangles of the surface, once it is known to have no defects.
     fn divide_surface(&mut self, path: &Path, cap: u64, settings: &Settings) -> Result<(), Error> {
         let scratch = scratch_beside(&self.surface.inner, cap, path)?;
-        attempt(|| surface::validate_in(&self.surface.inner, &scratch))?.accept()?;
+        attempt(|| surface::validate_with(&self.surface.inner, &scratch))?.accept()?;
         let field = self.sizes.field.as_deref();
         divide(&mut self.surface, &self.options, field, cap, path, settings)
     }
@@ -372,15 +372,15 @@ impl Mesher {
         pipeline::ahead(surface, &self.options, cap, &watch, |taken| {
             let left = cap - taken;
             let scratch = scratch_beside(surface, left, path)?;
-            attempt(|| surface::validate_in(surface, &scratch))?.accept()?;
+            attempt(|| surface::validate_with(surface, &scratch))?.accept()?;
             settings.note(format!(
                 "{} triangles{} and {} vertices, closed and free of defects ({:.1} s)",
-                surface.n_own_triangles(),
+                surface.n_input_triangles(),
                 match surface.n_sheet_triangles() {
                     0 => String::new(),
                     n => format!(", {n} of them in sheets,"),
                 },
-                surface.n_own_vertices(),
+                surface.n_input_vertices(),
                 clock.elapsed().as_secs_f64()
             ));
             settings.note(format!("memory: {}", settings.cap_in_words()));

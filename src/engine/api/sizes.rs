@@ -7,7 +7,7 @@ use super::Error;
 use super::field_arrays::{FieldArrays, IN_STORE};
 use crate::pipeline::SizeFile;
 use tetdb_base::geom::Point;
-use tetdb_kernel::sizing::{Formula, Length, RegionSize, Shape, SizeOptions, SizeSource};
+use tetdb_kernel::sizing::{Formula, Length, RegionSize, SizeOptions, SizeSource, SourceShape};
 
 /// Wanted edge lengths: those of the surface's own edges, and where something else is said here, the least of all.
 ///
@@ -54,7 +54,7 @@ impl Sizes {
     /// `h` in the box between two corners; outside of it lengths grow, or are `outside` at most.
     pub fn in_box(self, low: [f64; 3], high: [f64; 3], h: Length, outside: Option<Length>) -> Self {
         let [p, q] = [low, high].map(Point::from_array);
-        self.with_shape(Shape::Box { low: p.min(q), high: p.max(q) }, h, outside)
+        self.with_shape(SourceShape::Box { low: p.min(q), high: p.max(q) }, h, outside)
     }
 
     /// `h` in a ball; outside of it lengths grow, or are `outside` at most.
@@ -66,7 +66,7 @@ impl Sizes {
         outside: Option<Length>,
     ) -> Self {
         let center = Point::from_array(center);
-        self.with_shape(Shape::Sphere { center, radius }, h, outside)
+        self.with_shape(SourceShape::Sphere { center, radius }, h, outside)
     }
 
     /// `h` in a cylinder around the axis from `a` to `b`; outside of it lengths grow, or are `outside` at most.
@@ -79,7 +79,7 @@ impl Sizes {
         outside: Option<Length>,
     ) -> Self {
         let ends = [a, b].map(Point::from_array);
-        self.with_shape(Shape::Cylinder { ends, radius }, h, outside)
+        self.with_shape(SourceShape::Cylinder { ends, radius }, h, outside)
     }
 
     /// `h` at most in a region, named by its number or by a label on it.
@@ -104,7 +104,7 @@ impl Sizes {
 
     /// Lengths at the vertices of a tetrahedral background mesh, linear in between; nothing is asked for outside of it.
     ///
-    /// Shape: `lengths` runs parallel to `points`, which `tets` index. The store keeps a copy. For a new mesh only. Errors:
+    /// SourceShape: `lengths` runs parallel to `points`, which `tets` index. The store keeps a copy. For a new mesh only. Errors:
     /// `count-mismatch`, `not-a-number`, `index-out-of-range`, `bad-size`, `unsupported-content` name the point or the tetrahedron.
     pub fn field_of_arrays(
         mut self,
@@ -118,7 +118,7 @@ impl Sizes {
         Ok(self)
     }
 
-    fn with_shape(mut self, shape: Shape, inside: Length, outside: Option<Length>) -> Self {
+    fn with_shape(mut self, shape: SourceShape, inside: Length, outside: Option<Length>) -> Self {
         self.sizes.sources.push(SizeSource { shape, inside, outside });
         self
     }

@@ -7,7 +7,7 @@ use tetdb_base::geom::short;
 use tetdb_base::shape::face_least;
 use tetdb_base::storage::attempt;
 use tetdb_base::surface::{
-    Fitness, Surface, closedness, fitness, repair, repair_bytes, split, validate_in,
+    Fitness, Surface, closedness, fitness, repair, repair_bytes, split, validate_with,
 };
 use tetdb_kernel::sizing::SizeField;
 
@@ -101,7 +101,7 @@ pub(super) fn suggestions(
         let scratch = settings.scratch_space(tried.bytes() as u64).ok()?;
         let is_valid = done.points_joined > 0
             && tried.n_triangles() > 0
-            && attempt(|| validate_in(&tried, &scratch)).is_ok_and(|found| found.is_valid());
+            && attempt(|| validate_with(&tried, &scratch)).is_ok_and(|found| found.is_valid());
         is_valid.then(|| (Some(share), measured(&tried)))
     });
     // The smallest change of the shape that does it.

@@ -12,11 +12,11 @@ use super::error::{Error, Remedy};
 use super::{DefectPlace, Length, Settings, guarded};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, attempt};
-use tetdb_base::surface::{self, SplitReport, SurfaceBuilder, orient_alike_in, split};
+use tetdb_base::surface::{self, SplitReport, SurfaceBuilder, orient_alike_with, split};
 use tetdb_io::read::{WireKind, is_stream, read_surface};
 use tetdb_io::write::{self, SurfaceReport as SurfaceWritten};
 use tetdb_kernel::samples::{PREFIX, SampleSpec};
-use tetdb_kernel::sizing::{Further, SizeField, SizeOptions};
+use tetdb_kernel::sizing::{ExtraSizes, SizeField, SizeOptions};
 
 /// A triangle surface with labels, read or given, all triangles turned like their neighbors.
 ///
@@ -89,7 +89,8 @@ pub(super) fn refine(
     refuse_sheets(surface, "refined")?;
     let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
     let (points, triangles) = (&surface.points, &surface.triangles);
-    let built = || SizeField::build_with(points, triangles, options, &Further::default(), scratch);
+    let built =
+        || SizeField::build_with(points, triangles, options, &ExtraSizes::default(), scratch);
     let (field, _) = attempt(built)??;
     let left = scratch.available().saturating_sub(field.bytes() as u64);
     Ok(split(surface, &|p| field.h(p).min(wanted), left)?)
@@ -97,7 +98,7 @@ pub(super) fn refine(
 
 /// What cannot be done any more once there are sheets.
 pub(super) fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
-    match surface.has_sheets() || surface.has_wires() {
+    match surface.has_sheets() || surface.has_embedded() {
         false => Ok(()),
         true => {
             Err(Error::new(Code::Usage, format!("a surface is {what} before anything is embedded")))
@@ -148,12 +149,12 @@ impl Surface {
 
     /// Number of triangles.
     pub fn n_triangles(&self) -> usize {
-        self.inner.n_own_triangles()
+        self.inner.n_input_triangles()
     }
 
     /// Number of vertices, those with the same coordinates counted once.
     pub fn n_vertices(&self) -> usize {
-        self.inner.n_own_vertices()
+        self.inner.n_input_vertices()
     }
 
     /// Low and high corner of the smallest box around it.
@@ -258,7 +259,7 @@ impl Surface {
     }
 
     fn refuse_wires(&self) -> Result<(), Error> {
-        match self.inner.has_wires() {
+        match self.inner.has_embedded() {
             false => Ok(()),
             true => Err(Error::new(Code::Usage, "sheets are embedded before edges and points")),
         }
@@ -274,8 +275,8 @@ impl Surface {
     /// Writes it, without embedded edges and points, as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
     pub fn write(&self, out: impl AsRef<Path>) -> Result<SurfaceWritten, Error> {
         guarded(&Settings::new(), || {
-            Ok(match self.inner.has_wires() {
-                true => write::surface(&self.inner.without_wires(), out.as_ref())?,
+            Ok(match self.inner.has_embedded() {
+                true => write::surface(&self.inner.without_embedded(), out.as_ref())?,
                 false => write::surface(&self.inner, out.as_ref())?,
             })
         })
@@ -296,7 +297,7 @@ impl Surface {
     /// Turns all triangles like their neighbors.
     pub(super) fn oriented(mut self, scratch: &ScratchSpace) -> Result<Self, Error> {
         self.inner.shrink();
-        let orientation = attempt(|| orient_alike_in(&mut self.inner, scratch))?;
+        let orientation = attempt(|| orient_alike_with(&mut self.inner, scratch))?;
         self.turned = orientation.flipped.len();
         Ok(self)
     }
@@ -315,7 +316,7 @@ impl Surface {
     #[doc(hidden)]
     pub fn keep_in(&self, store: &Path) -> Result<(), Error> {
         if self.sources.iter().any(|source| source.origin == Origin::Copy) {
-            write::surface(&self.inner.without_wires(), &in_store(store))?;
+            write::surface(&self.inner.without_embedded(), &in_store(store))?;
         }
         self.keep_wires_in(store)
     }
@@ -415,7 +416,7 @@ impl Surface {
         let spec = SampleSpec::parse(word)?;
         let source = Source::unmarked(Origin::Sample(spec.canonical()));
         let mut inner = surface::Surface::from(spec.make_within(cap)?);
-        inner.hold_wires(&ScratchSpace::boundless())?;
+        inner.add_support_triangles(&ScratchSpace::boundless())?;
         Ok(Self::of(inner, vec![source]))
     }
 

@@ -4,17 +4,17 @@ use super::Surface;
 impl Surface {
     /// Positions of the vertices, those with the same coordinates once.
     pub fn points(&self) -> &[[f64; 3]] {
-        bytemuck::cast_slice(&self.inner.points[..self.inner.n_own_vertices()])
+        bytemuck::cast_slice(&self.inner.points[..self.inner.n_input_vertices()])
     }
 
     /// Three positions in [`Surface::points`] for each triangle, turned like their neighbors.
     pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.inner.triangles[..self.inner.n_own_triangles()]
+        &self.inner.triangles[..self.inner.n_input_triangles()]
     }
 
     /// The label of each triangle, a position in [`Surface::labels`].
     pub fn labels_of_triangles(&self) -> &[u32] {
-        &self.inner.labels[..self.inner.n_own_triangles()]
+        &self.inner.labels[..self.inner.n_input_triangles()]
     }
 }
 

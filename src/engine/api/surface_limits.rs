@@ -5,7 +5,7 @@ use std::path::Path;
 use super::surface::refine;
 use super::{Error, Length, Settings, Surface, guarded};
 use tetdb_base::storage::attempt;
-use tetdb_base::surface::{SplitReport, validate_in};
+use tetdb_base::surface::{SplitReport, validate_with};
 use tetdb_io::read::WireKind as EmbeddedKind;
 use tetdb_io::write;
 use tetdb_kernel::sizing::SizeOptions;
@@ -49,7 +49,7 @@ impl Surface {
     pub fn validate_with(&self, settings: &Settings) -> Result<(), Error> {
         guarded(settings, || {
             let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
-            Ok(attempt(|| validate_in(&self.inner, &scratch))?.accept()?)
+            Ok(attempt(|| validate_with(&self.inner, &scratch))?.accept()?)
         })
     }
 
@@ -74,7 +74,7 @@ impl Surface {
 
     /// Numbers of embedded edges and of embedded points.
     pub fn n_embedded(&self) -> [usize; 2] {
-        let embedded = &self.inner.wires;
+        let embedded = &self.inner.embedded;
         [embedded.edges.len(), embedded.points.len()]
     }
 
@@ -90,6 +90,6 @@ impl Surface {
 
     /// Writes embedded edges and points to an `.obj` file. Errors: the disk.
     pub fn write_embedded(&self, out: impl AsRef<Path>) -> Result<(), Error> {
-        Ok(write::wires(&self.inner.wire_set(), out.as_ref())?)
+        Ok(write::wires(&self.inner.embedded_set(), out.as_ref())?)
     }
 }

@@ -8,7 +8,7 @@ use super::error::{Error, Remedy};
 use super::surface::{given, refuse_sheets};
 use super::{Bytes, Settings, Surface, guarded};
 use tetdb_base::storage::attempt;
-use tetdb_base::surface::{Repair, repair, repair_bytes, validate_in};
+use tetdb_base::surface::{Repair, repair, repair_bytes, validate_with};
 
 /// Points are joined up to this share of the box diagonal at most: beyond it a surface loses its shape.
 pub const WELD_SHARE_MAX: f64 = 0.01;
@@ -81,7 +81,7 @@ impl Surface {
                 return Err(Error::new(Code::Memory, message).with_remedy(Remedy::Memory(least)));
             }
             let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
-            let n_defects_before = attempt(|| validate_in(&self.inner, &scratch))?.n_defects;
+            let n_defects_before = attempt(|| validate_with(&self.inner, &scratch))?.n_defects;
             let (triangles_before, vertices_before) =
                 (self.inner.n_triangles(), self.inner.n_vertices());
             let weld_distance = weld.map(|share| share * self.inner.bounds().diagonal());

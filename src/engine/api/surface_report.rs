@@ -13,7 +13,7 @@ use tetdb_base::shape::face_least;
 use tetdb_base::storage::attempt;
 use tetdb_base::surface::{
     self, BoundaryLoop, Closing, Defect, Fitness, Validation, boundary_loops, closing, fitness,
-    repair_bytes, validate_in,
+    repair_bytes, validate_with,
 };
 use tetdb_io::write;
 
@@ -80,7 +80,7 @@ impl<'a> SurfaceReport<'a> {
     ) -> Result<Self, Error> {
         let cap = settings.cap()?;
         let scratch = settings.scratch_space(surface.bytes() as u64)?;
-        let validation = attempt(|| validate_in(surface, &scratch))?;
+        let validation = attempt(|| validate_with(surface, &scratch))?;
         drop(scratch);
         let fitness = fitness(surface, &validation.closedness);
         let is_estimated =

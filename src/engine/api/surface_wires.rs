@@ -12,7 +12,7 @@ use super::surface::{given, halves, source};
 use super::{Settings, Surface, guarded};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, attempt};
-use tetdb_base::surface::WireSet;
+use tetdb_base::surface::EmbeddedSet;
 use tetdb_io::read::{WireKind, read_wires};
 use tetdb_io::write;
 
@@ -111,7 +111,7 @@ impl Surface {
         self.with_recorded(&set, name, Some(Source { origin, bytes, hash }), scratch)
     }
 
-    fn with_set(self, set: &WireSet, name: &str) -> Result<Self, Error> {
+    fn with_set(self, set: &EmbeddedSet, name: &str) -> Result<Self, Error> {
         guarded(&Settings::new(), || {
             self.with_recorded(set, name, None, &ScratchSpace::boundless())
         })
@@ -120,7 +120,7 @@ impl Surface {
     /// Adds edges and points; `record`: where they can be read again, as long as nothing else changes.
     fn with_recorded(
         mut self,
-        set: &WireSet,
+        set: &EmbeddedSet,
         name: &str,
         record: Option<Source>,
         scratch: &ScratchSpace,
@@ -129,7 +129,7 @@ impl Surface {
             true => attempt(|| self.inner.divide_at(set, scratch))??,
             false => 0,
         };
-        attempt(|| self.inner.embed_wires(set, name, scratch))??;
+        attempt(|| self.inner.embed_set(set, name, scratch))??;
         let is_kept = self.keeps_embedded();
         match record {
             Some(record) if n_divided == 0 && !is_kept => self.sources.push(record),
@@ -140,12 +140,12 @@ impl Surface {
 
     /// Makes the store keep all of it, in the order in which that is read again.
     pub(super) fn keep_all(&mut self, scratch: &ScratchSpace) -> Result<(), Error> {
-        if !self.inner.has_sheets() && !self.inner.has_wires() {
+        if !self.inner.has_sheets() && !self.inner.has_embedded() {
             self.sources = vec![given(&self.inner)];
             return Ok(());
         }
-        let set = self.inner.wire_set();
-        let mut plain = self.inner.without_wires();
+        let set = self.inner.embedded_set();
+        let mut plain = self.inner.without_embedded();
         let first = plain.sheets_last();
         self.sources = vec![given(&plain)];
         if plain.has_sheets() {
@@ -162,7 +162,7 @@ impl Surface {
     /// Puts a copy of edges and points that are not in files of their own into the store's folder. Errors: the disk.
     pub(super) fn keep_wires_in(&self, store: &Path) -> Result<(), Error> {
         if self.keeps_embedded() {
-            write::wires(&self.inner.wire_set(), &in_store(store))?;
+            write::wires(&self.inner.embedded_set(), &in_store(store))?;
         }
         Ok(())
     }
@@ -185,7 +185,7 @@ impl Surface {
                 attempt(|| self.inner.embed_named(&set, scratch))??;
             }
         }
-        self.sources.push(kept(&self.inner.wire_set()));
+        self.sources.push(kept(&self.inner.embedded_set()));
         Ok(self)
     }
 }
@@ -196,7 +196,7 @@ fn in_store(store: &Path) -> PathBuf {
 }
 
 /// What identifies edges and points that the store keeps.
-fn kept(set: &WireSet) -> Source {
+fn kept(set: &EmbeddedSet) -> Source {
     let mut hash = Xxh3::new();
     for x in set.points.iter().flat_map(|p| p.to_array()) {
         hash.update(&x.to_le_bytes());
@@ -207,21 +207,21 @@ fn kept(set: &WireSet) -> Source {
     Source { origin: Origin::EmbeddedCopy(counts), bytes: 0, hash: halves(&hash) }
 }
 
-fn set_of(points: &[[f64; 3]]) -> Result<WireSet, Error> {
+fn set_of(points: &[[f64; 3]]) -> Result<EmbeddedSet, Error> {
     let is_bad = |p: &[f64; 3]| p.iter().any(|x| !x.is_finite());
     if let Some(i) = points.iter().position(is_bad) {
         let message = "a coordinate is not a finite number";
         return Err(Error::new(Code::NotANumber, message).at(format!("point {i}")));
     }
-    Ok(WireSet {
+    Ok(EmbeddedSet {
         points: points.iter().map(|&p| Point::from_array(p)).collect(),
-        ..WireSet::default()
+        ..EmbeddedSet::default()
     })
 }
 
 /// The number of each one's label, all of them `name` where there are none.
 fn labels_of(
-    set: &mut WireSet,
+    set: &mut EmbeddedSet,
     (n, what): (usize, &str),
     labels: Option<&[&str]>,
     name: &str,

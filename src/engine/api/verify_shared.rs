@@ -154,8 +154,8 @@ pub(super) fn fingerprint(surface: &Surface) -> u64 {
     put(&mut surface.points.iter().flat_map(bits).flat_map(halves));
     put(&mut surface.triangles.iter().flatten().copied());
     put(&mut surface.sheets.iter().map(|&is_sheet| is_sheet.into()));
-    put(&mut surface.wires.edges.iter().flatten().copied());
-    put(&mut surface.wires.points.iter().flatten().copied());
-    put(&mut surface.wires.fins.iter().flatten().copied());
+    put(&mut surface.embedded.edges.iter().flatten().copied());
+    put(&mut surface.embedded.points.iter().flatten().copied());
+    put(&mut surface.embedded.first_support.iter().flatten().copied());
     sum.digest()
 }

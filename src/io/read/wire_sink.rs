@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use tetdb_base::geom::Point;
-use tetdb_base::surface::{SurfaceError, WireSet};
+use tetdb_base::surface::{EmbeddedSet, SurfaceError};
 
 /// What is wanted of a file that may have both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub enum WireKind {
 /// Edges or points being read.
 #[derive(Default)]
 pub(super) struct WireSink {
-    pub set: WireSet,
+    pub set: EmbeddedSet,
     /// What is called by no name of its own is called so.
     stem: String,
     labels: HashMap<String, u32>,
@@ -33,7 +33,7 @@ impl WireSink {
     /// Refuses `more` bytes that do not fit beside what it holds.
     pub fn check_bytes(&self, more: u64) -> Result<(), SurfaceError> {
         match self.set.bytes() + more > self.bytes_max {
-            true => Err(SurfaceError::WireMemory {
+            true => Err(SurfaceError::EmbedMemory {
                 bytes_max: self.bytes_max,
                 vertices: self.set.points.len(),
             }),

@@ -8,13 +8,13 @@ use super::open::{Reader, open, stem, unpacked_name};
 use super::wire_sink::{WireKind, WireSink};
 use super::{obj, tetgen, vtk};
 use tetdb_base::geom::Point;
-use tetdb_base::surface::WireSet;
+use tetdb_base::surface::EmbeddedSet;
 
 /// Reads the edges or the points of a file, labels after its groups or markers, else after the file. `cap`: bytes of memory it may take.
 ///
 /// # Errors
 /// The first [`ReadError`] with its place; a file without any is one.
-pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
+pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<EmbeddedSet> {
     let mut feed = open(path, cap / 4)?;
     let file = feed.file().to_owned();
     let mut sink = WireSink::called(stem(path), cap / 4);

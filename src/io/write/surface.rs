@@ -5,7 +5,7 @@ use std::path::Path;
 use super::draft::Draft;
 use super::error::{Result, WriteError};
 use super::stream::Stream;
-use tetdb_base::surface::{Surface, WireSet};
+use tetdb_base::surface::{EmbeddedSet, Surface};
 
 /// A writer of one format.
 type Write = fn(&Surface, &mut Stream) -> Result<()>;
@@ -167,7 +167,7 @@ fn obj(surface: &Surface, stream: &mut Stream) -> Result<()> {
 /// Writes edges and points to `out` as an `.obj` file of lines (`l`) and points (`p`), exactly.
 ///
 /// Errors: [`WriteError`]; `out` is not touched then.
-pub fn wires(set: &WireSet, out: &Path) -> Result<()> {
+pub fn wires(set: &EmbeddedSet, out: &Path) -> Result<()> {
     let mut draft = Draft::new(out)?;
     let path = draft.create(out, 0)?;
     let mut stream = Stream::open(&path)?;

@@ -12,7 +12,7 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    pub(super) fn add(&mut self, p: Point, weight: f64) {
+    pub fn add(&mut self, p: Point, weight: f64) {
         self.weight += weight;
         self.first += p * weight;
         let products = [p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.x * p.z, p.y * p.z];
@@ -22,7 +22,7 @@ impl Moments {
     }
 
     /// The matrix of central moments.
-    pub(super) fn matrix(&self) -> [[f64; 3]; 3] {
+    pub fn matrix(&self) -> [[f64; 3]; 3] {
         let g = self.first / self.weight;
         let s = self.second.map(|s| s / self.weight);
         let (xy, xz, yz) = (s[3] - g.x * g.y, s[4] - g.x * g.z, s[5] - g.y * g.z);

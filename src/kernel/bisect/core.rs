@@ -11,18 +11,19 @@ use tetdb_base::geom::Point;
 use tetdb_base::storage::{Pages, check_cancelled};
 use tetdb_schema::page::NONE;
 
-/// Tetrahedra with a vertex nearer than this, in units of its h, belong to the core: wider than the cutting zone, so that
-/// what the interface is chosen from is optimized, narrower than the refined zone, so that all of it is final.
+/// Tetrahedra with a vertex nearer than this, in units of its h, belong to the core. It is wider than the cutting zone,
+/// so that all candidates for the interface are optimized, and narrower than the refined zone, so that all of it is
+/// final.
 const CORE: f64 = 2.2;
 /// In the host's scratch map, at a vertex: it has this number in the core.
 pub(super) const SHARED: u32 = 1 << 31;
 
-/// The host's scratch map from the extraction of the core to the end of the split, behind one word a vertex: what became of each
-/// tetrahedron, in the two highest bits, with a number.
-pub(super) mod fate {
+/// The host's scratch map from the extraction of the core to the end of the split, after one word per vertex: the new
+/// place of each tetrahedron in the two highest bits, with a number.
+pub(super) mod placement {
     use tetdb_schema::page::NONE;
 
-    /// Of neither side and not in the core: its id is not in use.
+    /// On neither side and not in the core: the id is not in use.
     pub(in super::super) const UNUSED: u32 = NONE;
     /// In the core, with its id there.
     pub(in super::super) const IN_CORE: u32 = 1 << 30;
@@ -32,7 +33,7 @@ pub(super) mod fate {
     pub(in super::super) const BITS: u32 = IN_CORE | HIGH;
 }
 
-/// Where a tetrahedron lies.
+/// Sides of the plane on which a tetrahedron has vertices.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Sides {
     pub low: bool,
@@ -40,15 +41,15 @@ pub(super) struct Sides {
 }
 
 impl Sides {
-    /// Whether vertices lie on both sides.
-    pub(super) fn crosses(self) -> bool {
+    /// Returns whether vertices lie on both sides.
+    pub fn crosses(self) -> bool {
         self.low && self.high
     }
 }
 
 /// Sides of the vertices of `tet`, and the least distance in units of h.
 #[inline]
-pub(super) fn place<P: Pages>(
+pub(super) fn sides_and_distance<P: Pages>(
     mesh: &mut Mesh<P>,
     tet: &Tet,
     surface: &impl CuttingSurface,
@@ -73,41 +74,39 @@ pub(super) struct BoundaryFace {
     pub host: FaceRef,
 }
 
-/// Where the core was cut out, ascending by vertices.
+/// Boundary of the core, ascending by vertices.
 #[derive(Default)]
 pub(super) struct CoreBoundary {
     pub faces: Vec<BoundaryFace>,
 }
 
 impl CoreBoundary {
-    /// The host's face at the core's face with these vertices, if it is one of the rim.
-    pub(super) fn find(&self, mut vertices: [u32; 3]) -> Option<FaceRef> {
+    /// The host's face at the core's face with these vertices, if it is one of the core boundary.
+    pub fn find(&self, mut vertices: [u32; 3]) -> Option<FaceRef> {
         vertices.sort_unstable();
         let at = self.faces.binary_search_by_key(&vertices, |f| f.vertices);
         at.ok().map(|at| self.faces[at].host)
     }
 }
 
-/// Whether `t` was copied into the core, as the scratch map of [`extract`] tells.
+/// Returns whether `t` was copied into the core, by the scratch map of [`extract`].
 pub(super) fn is_in_core<P: Pages>(host: &mut Mesh<P>, t: u32) -> bool {
     let base = dense(host.vertex_ids_end());
-    host.scratch(base + dense(t)) & fate::BITS == fate::IN_CORE
+    host.scratch(base + dense(t)) & placement::BITS == placement::IN_CORE
 }
 
-/// Copies the core of `host` into the empty `core`; tells the rim.
+/// Copies the core of `host` into the empty `core`; returns its boundary.
 ///
-/// Effects: the host's scratch map holds for each vertex the number in the core with [`SHARED`], or else how many were met before it in
-/// tetrahedra out of the core, or [`NONE`]; behind that the [`fate`] of each tetrahedron.
+/// Effects: the host's scratch map has for each vertex its number in the core with [`SHARED`]; for others the order in
+/// which they were met in tetrahedra outside the core, or [`NONE`]. After that it has the [`placement`] of each
+/// tetrahedron.
 pub(super) fn extract<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     surface: &impl CuttingSurface,
 ) -> CoreBoundary {
-    host.clear_scratch();
     let base = dense(host.vertex_ids_end());
-    for n in 0..base {
-        host.set_scratch(n, NONE);
-    }
+    host.reset_scratch(base, NONE);
     let (mut at, mut met) = (base, 0);
     let mut t = 0;
     while t < host.tet_ids_end() {
@@ -116,9 +115,9 @@ pub(super) fn extract<P: Pages, Q: Pages>(
         }
         let tet = host.tet(t);
         let word = if tet.is_live() {
-            let (sides, least) = place(host, &tet, surface);
+            let (sides, least) = sides_and_distance(host, &tet, surface);
             if sides.crosses() || least <= CORE {
-                fate::IN_CORE | copy_tet(host, core, t, &tet)
+                placement::IN_CORE | copy_tet(host, core, t, &tet)
             } else {
                 for v in tet.vertices() {
                     if host.scratch(dense(v)) == NONE {
@@ -126,17 +125,17 @@ pub(super) fn extract<P: Pages, Q: Pages>(
                         met += 1;
                     }
                 }
-                if sides.high { fate::HIGH } else { 0 }
+                if sides.high { placement::HIGH } else { 0 }
             }
         } else {
-            fate::UNUSED
+            placement::UNUSED
         };
         host.set_scratch(at, word);
         at += 1;
         t = next_id(t);
     }
     // The copies still name the host's neighbors.
-    let mut rim = CoreBoundary::default();
+    let mut core_boundary = CoreBoundary::default();
     let mut from = 0;
     while let Some((t, mut tet)) = core.next_tet(from) {
         from = t + 1;
@@ -146,8 +145,8 @@ pub(super) fn extract<P: Pages, Q: Pages>(
                 continue;
             }
             let word = host.scratch(base + dense(across.tet()));
-            if word & fate::BITS == fate::IN_CORE {
-                tet.neighbor[i] = FaceRef::new(word & !fate::BITS, across.face());
+            if word & placement::BITS == placement::IN_CORE {
+                tet.neighbor[i] = FaceRef::new(word & !placement::BITS, across.face());
                 continue;
             }
             tet.neighbor[i] = FaceRef::NONE;
@@ -159,12 +158,12 @@ pub(super) fn extract<P: Pages, Q: Pages>(
                 }
             }
             vertices.sort_unstable();
-            rim.faces.push(BoundaryFace { vertices, host: across });
+            core_boundary.faces.push(BoundaryFace { vertices, host: across });
         }
         core.set_tet(t, tet);
     }
-    rim.faces.sort_unstable();
-    rim
+    core_boundary.faces.sort_unstable();
+    core_boundary
 }
 
 fn copy_tet<P: Pages, Q: Pages>(host: &mut Mesh<P>, core: &mut Mesh<Q>, t: u32, tet: &Tet) -> u32 {
@@ -192,7 +191,7 @@ fn copy_vertex<P: Pages, Q: Pages>(host: &mut Mesh<P>, core: &mut Mesh<Q>, v: u3
     copy
 }
 
-/// Whether a vertex of the core is fixed only because it lies on the rim.
+/// Returns whether a vertex of the core is fixed only because it lies on the core boundary.
 pub(super) fn is_held<P: Pages>(core: &mut Mesh<P>, v: u32) -> bool {
     core.vertex_attribute(v).0 == VertexTag::Interface && core.interface_vertex(v).0 == 0
 }

@@ -1,9 +1,9 @@
-//! What a child takes over of facets and interface faces.
+//! Facets and interface faces that a child inherits.
 //!
 //! A facet with a vertex that only one child has lies in that child, with all its tetrahedra. Only those at the core, whose vertices both
 //! may have, are looked up among the required faces there.
 
-use super::child::Split;
+use super::child_builder::ChildBuilder;
 use super::core::SHARED;
 use crate::mesh::anatomy::FROZEN;
 use crate::mesh::{FaceRef, Workspace, dense};
@@ -12,7 +12,7 @@ use tetdb_schema::page::NONE;
 
 sort_record! {
     /// A required face of the child.
-    struct RequiredFace {
+    struct ChildFace {
         /// Ascending.
         vertices: [u32; 3],
         /// A [`FaceRef`].
@@ -22,7 +22,7 @@ sort_record! {
 
 sort_record! {
     /// A facet or interface face of the host.
-    struct Claim {
+    struct CarriedFace {
         /// In the child, ascending.
         vertices: [u32; 3],
         /// [`FACET`] or [`INTERFACE`].
@@ -40,10 +40,10 @@ const INTERFACE: u8 = 1;
 ///
 /// Errors: the disk, while sorting.
 pub(super) fn inherit<P: Pages, Q: Pages, R: Pages>(
-    split: &mut Split<P, Q, R>,
+    split: &mut ChildBuilder<P, Q, R>,
     space: &Workspace,
 ) -> Result<(), StorageError> {
-    let mut claims = Sorter::new(space.dir, space.memory / 3);
+    let mut inherited = Sorter::new(space.dir, space.memory / 3);
     let mut loose = None;
     for n in 0..split.host.n_facets() {
         let facet = split.host.facet(n);
@@ -57,43 +57,43 @@ pub(super) fn inherit<P: Pages, Q: Pages, R: Pages>(
             }
             continue;
         }
-        split.claim(&mut claims, facet.vertices, FACET, n)?;
+        split.candidate(&mut inherited, facet.vertices, FACET, n)?;
     }
     for n in 0..split.host.n_interface_faces() {
         let face = split.host.interface_face(n);
-        split.claim(&mut claims, face.vertices, INTERFACE, n)?;
+        split.candidate(&mut inherited, face.vertices, INTERFACE, n)?;
     }
     let mut faces = split.required_faces(space)?.peekable();
-    for claim in claims.finish()? {
-        let claim = claim?;
-        if !claim.in_core {
-            split.inherit_face(claim, None);
+    for candidate in inherited.finish()? {
+        let candidate = candidate?;
+        if !candidate.in_core {
+            split.inherit_face(candidate, None);
             continue;
         }
-        let is_before = |face: &RequiredFace| face.vertices < claim.vertices;
+        let is_before = |face: &ChildFace| face.vertices < candidate.vertices;
         while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, is_before)) {
             face?;
         }
         let Some(Ok(face)) = faces.peek() else {
             continue;
         };
-        if face.vertices == claim.vertices {
-            split.inherit_face(claim, Some(FaceRef(face.place)));
+        if face.vertices == candidate.vertices {
+            split.inherit_face(candidate, Some(FaceRef(face.place)));
         }
     }
     Ok(())
 }
 
-impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
+impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
     /// The child's numbers of three vertices of a face, and whether the core has them all; `None` when the child lacks one.
-    fn known_face(&mut self, vertices: [u32; 3]) -> Option<([u32; 3], bool)> {
+    fn child_face(&mut self, vertices: [u32; 3]) -> Option<([u32; 3], bool)> {
         let mut numbers = [NONE; 3];
         let mut in_core = true;
         for (number, v) in numbers.iter_mut().zip(vertices) {
             *number = self.host.scratch(dense(v));
             if *number & SHARED == 0 {
                 // All of its tetrahedra are on its side, and so are those of the face.
-                if in_core && !self.is_beside(v) {
+                if in_core && !self.is_on_side(v) {
                     return None;
                 }
                 in_core = false;
@@ -107,21 +107,21 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         Some((numbers, in_core))
     }
 
-    fn claim(
+    fn candidate(
         &mut self,
-        claims: &mut Sorter<Claim>,
+        inherited: &mut Sorter<CarriedFace>,
         vertices: [u32; 3],
         kind: u8,
         number: u32,
     ) -> Result<(), StorageError> {
-        let Some((mut vertices, in_core)) = self.known_face(vertices) else {
+        let Some((mut vertices, in_core)) = self.child_face(vertices) else {
             return Ok(());
         };
         vertices.sort_unstable();
-        claims.push(Claim { vertices, kind, number, in_core })
+        inherited.push(CarriedFace { vertices, kind, number, in_core })
     }
 
-    /// Makes room behind the host's scratch map for the numbers of vertices without tetrahedra; returns where.
+    /// Extends the host's scratch map for the numbers of vertices without tetrahedra; returns the begin of that part.
     fn loose_vertices(&mut self) -> u32 {
         let base = self.host_base + dense(self.host.tet_ids_end());
         for n in 0..self.host_base {
@@ -132,12 +132,12 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
 
     /// The child's number of a vertex of a facet that has no tetrahedra.
     fn loose_vertex(&mut self, base: u32, v: u32) -> u32 {
-        if let Some(([number, ..], _)) = self.known_face([v; 3]) {
+        if let Some(([number, ..], _)) = self.child_face([v; 3]) {
             return number;
         }
-        let known = self.host.scratch(base + dense(v));
-        if known != NONE {
-            return known;
+        let word = self.host.scratch(base + dense(v));
+        if word != NONE {
+            return word;
         }
         let number = self.add_host_vertex(v);
         self.host.set_scratch(base + dense(v), number);
@@ -145,7 +145,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
     }
 
     /// The child's required faces whose three vertices the core has.
-    fn required_faces(&mut self, space: &Workspace) -> Result<Sorted<RequiredFace>, StorageError> {
+    fn required_faces(&mut self, space: &Workspace) -> Result<Sorted<ChildFace>, StorageError> {
         let mut faces = Sorter::new(space.dir, space.memory / 3);
         for n in 0..dense(self.core.tet_ids_end()) {
             let number = self.core.scratch(self.core_base + n);
@@ -153,41 +153,37 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
                 self.push_required(&mut faces, number)?;
             }
         }
-        for k in 0..self.at_core.len() {
-            let number = self.at_core[k];
+        for k in 0..self.tets_at_core.len() {
+            let number = self.tets_at_core[k];
             self.push_required(&mut faces, number)?;
         }
         faces.finish()
     }
 
-    fn push_required(
-        &mut self,
-        faces: &mut Sorter<RequiredFace>,
-        t: u32,
-    ) -> Result<(), StorageError> {
+    fn push_required(&mut self, faces: &mut Sorter<ChildFace>, t: u32) -> Result<(), StorageError> {
         let tet = self.child.tet(t);
         for i in (0..4).filter(|&i| tet.is_required(i)) {
             let mut vertices = tet.face(i);
             vertices.sort_unstable();
             let place = FaceRef::new(t, i).0;
-            faces.push(RequiredFace { vertices, place })?;
+            faces.push(ChildFace { vertices, place })?;
         }
         Ok(())
     }
 
-    /// Takes a facet or interface face over; `face` is where it is, for one that was at the core.
-    fn inherit_face(&mut self, claim: Claim, face: Option<FaceRef>) {
-        let known = "claimed with its vertices";
-        if claim.kind == FACET {
-            let mut facet = self.host.facet(claim.number);
-            facet.vertices = self.known_face(facet.vertices).expect(known).0;
+    /// Copies a facet or interface face to the child; `face` is its place if it was at the core.
+    fn inherit_face(&mut self, candidate: CarriedFace, face: Option<FaceRef>) {
+        let listed = "listed with its vertices";
+        if candidate.kind == FACET {
+            let mut facet = self.host.facet(candidate.number);
+            facet.vertices = self.child_face(facet.vertices).expect(listed).0;
             self.child.add_facet(facet);
             return;
         }
-        let mut kept = self.host.interface_face(claim.number);
-        kept.vertices = self.known_face(kept.vertices).expect(known).0;
+        let mut kept = self.host.interface_face(candidate.number);
+        kept.vertices = self.child_face(kept.vertices).expect(listed).0;
         self.child.add_interface_face(kept);
-        // What was copied out of the host is frozen already.
+        // Tetrahedra copied from the host are frozen already.
         if let Some(face) = face {
             let (region, _) = self.child.tet_attribute(face.tet());
             self.child.set_tet_attribute(face.tet(), region, FROZEN);

@@ -1,4 +1,4 @@
-//! The interface: a minimum cut of the cutting zone, then moves that no sum over faces can see.
+//! The interface: a minimum cut of the cutting zone, then moves with costs that are no sums over faces.
 //!
 //! Labels by the side of the middle give 3.85 faces per h² of the plane, many tetrahedra with two or three of them and pinched
 //! vertices. The minimum cut of the dual graph is the best of all interfaces for any cost that is a sum over faces:
@@ -8,10 +8,10 @@
 //! Source: the paper, section 1.1, "Choosing the interface", which makes the moves alone.
 
 use super::core::CoreBoundary;
-use super::flow::{Arc, Graph};
+use super::flow::{FlowArc, Graph};
 use super::interface_faces::interface_points;
-use super::labels::{InterfaceMeasures, Labels, face_cost, measure};
-use super::moves::{Moves, Steps};
+use super::moves::Moves;
+use super::side_labels::{InterfaceMeasures, SideLabels, face_cost, measure};
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
 use tetdb_base::geom::Point;
@@ -23,19 +23,19 @@ use tetdb_schema::page::NONE;
 const STRIP: usize = 100_000;
 /// Share of a strip on each side of a border that is cut again, because each was cut without the other.
 const BORDER: usize = 8;
-/// Cost of a tetrahedron of volume h³ on the other side than its middle, for each h that this lies beside the plane. Without, the least cut is as a whole anywhere
-/// between the limits: 0.15 to 0.4 h off, so that a box in 64 had parts of 0.85 to 1.18 of the mean, and not of 0.98 to 1.02; it had 1 % fewer faces, of walls between balls
-/// 6 %.
+/// Cost of a tetrahedron of volume h³ on the other side than its middle, for each h between the middle and the plane.
+/// Without this cost the least cut as a whole lies anywhere between the limits, 0.15 to 0.4 h off: the parts of a box
+/// in 64 had 0.85 to 1.18 of the mean, with it 0.98 to 1.02. It had 1 % fewer faces; for walls between balls 6 %.
 const CENTERED: f64 = 1.0;
 /// Most that costs, as much as several faces: a tetrahedron on a long triangle of the input may be much larger than h³.
 const CENTERED_MOST: f64 = 4.0;
 /// Capacities are costs in this fraction.
 const SCALE: f64 = 256.0;
 
-/// How the interface came about.
+/// Report of the choice of an interface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InterfaceReport {
-    /// Most bytes the choice held beside the core.
+    /// Most bytes held besides the core.
     pub bytes: u64,
     /// Tetrahedra of the cutting zone.
     pub free_tets: u64,
@@ -49,30 +49,28 @@ pub struct InterfaceReport {
     pub moves: u64,
 }
 
-/// Chooses sides; tells the faces of the natural interface where they are wanted. Effects: its scratch map is used up; `tet_of` must be right.
+/// Chooses sides, and stores the faces of the natural interface in `natural`. Effects: uses up the core's scratch map;
+/// `tet_of` must be right.
 pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
     surface: &impl CuttingSurface,
-    rim: &CoreBoundary,
-    steps: Steps,
+    core_boundary: &CoreBoundary,
     natural: Option<&mut Vec<[Point; 3]>>,
-) -> (InterfaceReport, Labels) {
-    let (labels, free) = Labels::begin(core, surface, rim);
+) -> (InterfaceReport, SideLabels) {
+    let (labels, free) = SideLabels::new(core, surface, core_boundary);
     if let Some(natural) = natural {
         *natural = interface_points(core, &labels);
     }
     let mut report = InterfaceReport { free_tets: free.len() as u64, ..InterfaceReport::default() };
-    let mut moves = Moves::new(core, labels, surface, rim);
-    report.natural = measure(core, &moves.labels, rim);
+    let mut moves = Moves::new(core, labels, surface, core_boundary);
+    report.natural = measure(core, &moves.labels, core_boundary);
     report.natural.pinched = moves.count_pinched(core, &free);
-    if steps.minimum_cut {
-        report.bytes = minimum_cut(core, &mut moves.labels, surface, &free);
-    }
+    report.bytes = minimum_cut(core, &mut moves.labels, surface, &free);
     report.bytes += size_of_val(&free[..]) as u64 + moves.bytes() + moves.labels.bytes();
-    report.minimum = measure(core, &moves.labels, rim);
+    report.minimum = measure(core, &moves.labels, core_boundary);
     report.minimum.pinched = moves.count_pinched(core, &free);
-    report.moves = moves.run(core, &free, steps);
-    report.chosen = measure(core, &moves.labels, rim);
+    report.moves = moves.run(core, &free);
+    report.chosen = measure(core, &moves.labels, core_boundary);
     report.chosen.pinched = moves.count_pinched(core, &free);
     (report, moves.labels)
 }
@@ -83,14 +81,11 @@ const AT_ONCE: usize = 2;
 /// Cuts strip by strip; returns the most bytes held.
 fn minimum_cut<P: Pages>(
     core: &mut Mesh<P>,
-    labels: &mut Labels,
+    labels: &mut SideLabels,
     surface: &impl CuttingSurface,
     free: &[u32],
 ) -> u64 {
-    core.clear_scratch();
-    for n in 0..dense(core.tet_ids_end()) {
-        core.set_scratch(n, NONE);
-    }
+    core.reset_scratch(dense(core.tet_ids_end()), NONE);
     let mut order = free.to_vec();
     let strips = free.len().div_ceil(STRIP).max(1);
     let mut sorting = 0;
@@ -99,7 +94,8 @@ fn minimum_cut<P: Pages>(
     }
     let length = free.len().div_ceil(strips).max(1);
     let half = length / BORDER;
-    // First every other strip, then those between, then what lies around the borders: those of one kind do not touch.
+    // First every other strip, then the strips between, then the regions around the borders: those of one kind do not
+    // touch.
     let mut kinds: [Vec<&[u32]>; 3] = [Vec::new(), Vec::new(), Vec::new()];
     for (k, strip) in order.chunks(length).enumerate() {
         kinds[k % 2].push(strip);
@@ -112,7 +108,8 @@ fn minimum_cut<P: Pages>(
     for strips in kinds.iter().flat_map(|kind| kind.chunks(AT_ONCE)) {
         for (&strip, (tets, graph)) in strips.iter().zip(&mut cuts) {
             check_cancelled();
-            // In id order, which follows the curve: what is near in space is near in the graph's memory. The least cut is one and the same.
+            // In id order, which follows the curve: neighbors in space are near in the graph's memory. The least cut
+            // does not depend on the order.
             tets.clear();
             tets.extend_from_slice(strip);
             tets.sort_unstable();
@@ -167,10 +164,10 @@ fn sort_along<P: Pages>(
     size_of_val(&keyed[..]) as u64
 }
 
-/// Makes the graph of a strip; what lies around it is source or sink.
+/// Builds the graph of a strip; tetrahedra around it are source or sink.
 fn read_strip<P: Pages>(
     core: &mut Mesh<P>,
-    labels: &Labels,
+    labels: &SideLabels,
     surface: &impl CuttingSurface,
     strip: &[u32],
     graph: &mut Graph,
@@ -181,7 +178,7 @@ fn read_strip<P: Pages>(
     graph.clear();
     for &t in strip {
         let tet = core.tet(t);
-        let mut arcs = [Arc::NONE; 4];
+        let mut arcs = [FlowArc::NONE; 4];
         let mut capacity = [0; 4];
         let mut terminal = pull(core, &tet, surface);
         for (i, across) in tet.neighbor.into_iter().enumerate() {
@@ -190,15 +187,15 @@ fn read_strip<P: Pages>(
             }
             let node = core.scratch(dense(across.tet()));
             if node != NONE && (node as usize) < graph.n_nodes() {
-                // Its own cost was found from the other side.
-                arcs[i] = Arc::new(node, across.face());
+                // The cost was found from the other side.
+                arcs[i] = FlowArc::new(node, across.face());
                 capacity[i] = graph.capacity(node, across.face());
                 continue;
             }
             let corners = tet.face(i).map(|v| core.point(v));
             let cost = symmetric_cost(corners, surface);
             if node != NONE {
-                (arcs[i], capacity[i]) = (Arc::new(node, across.face()), cost);
+                (arcs[i], capacity[i]) = (FlowArc::new(node, across.face()), cost);
             } else {
                 terminal[usize::from(labels.is_high(across.tet()))] += cost;
             }
@@ -210,7 +207,7 @@ fn read_strip<P: Pages>(
     }
 }
 
-/// What it costs to have `tet` on the other side than its middle: where it is no source or sink, that much fits from the one it belongs to.
+/// Cost of `tet` on the other side than its middle, as capacities from the source and to the sink.
 fn pull<P: Pages>(core: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSurface) -> [u32; 2] {
     let ends = core.ends(tet);
     let [a, b, c, d] = ends.map(|end| end.point);
@@ -222,8 +219,8 @@ fn pull<P: Pages>(core: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSurface) 
     if away < 0.0 { [cost, 0] } else { [0, cost] }
 }
 
-/// Labels a strip as its graph was cut.
-fn label_strip(labels: &mut Labels, strip: &[u32], graph: &Graph) {
+/// Labels a strip by the sides of its cut graph.
+fn label_strip(labels: &mut SideLabels, strip: &[u32], graph: &Graph) {
     for (node, &t) in strip.iter().enumerate() {
         debug_assert!(labels.is_free(t));
         labels.set_high(t, !graph.is_source_side(node as u32));

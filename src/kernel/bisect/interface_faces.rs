@@ -1,13 +1,13 @@
-//! The faces of a chosen interface, in the order that gives them and their vertices their numbers.
+//! The faces of a chosen interface, in the order that numbers them and their vertices.
 
 use super::core::{is_held, tet_ids};
-use super::labels::Labels;
+use super::side_labels::SideLabels;
 use crate::mesh::{Mesh, Tet};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::Pages;
 
 /// Gives the vertices of the cut's interface their numbers, in the order of its faces; returns how many they are.
-pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, labels: &Labels, cut: u32) -> u32 {
+pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, labels: &SideLabels, cut: u32) -> u32 {
     let mut vertices = 0;
     for_each_interface_face(core, labels, |core, tet, i| {
         for v in tet.face(i) {
@@ -21,7 +21,10 @@ pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, labels: &Labels, cu
 }
 
 /// The interface faces by their points, in id order.
-pub(super) fn interface_points<P: Pages>(core: &mut Mesh<P>, labels: &Labels) -> Vec<[Point; 3]> {
+pub(super) fn interface_points<P: Pages>(
+    core: &mut Mesh<P>,
+    labels: &SideLabels,
+) -> Vec<[Point; 3]> {
     let mut points = Vec::new();
     for_each_interface_face(core, labels, |core, tet, i| {
         points.push(tet.face(i).map(|v| core.point(v)));
@@ -32,7 +35,7 @@ pub(super) fn interface_points<P: Pages>(core: &mut Mesh<P>, labels: &Labels) ->
 /// Calls `visit` with every interface face, seen from its tetrahedron on the low side, in id order.
 pub(super) fn for_each_interface_face<P: Pages>(
     core: &mut Mesh<P>,
-    labels: &Labels,
+    labels: &SideLabels,
     mut visit: impl FnMut(&mut Mesh<P>, &Tet, usize),
 ) {
     for t in tet_ids(core) {

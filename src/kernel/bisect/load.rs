@@ -1,4 +1,4 @@
-//! The load ∫ h⁻³ of a mesh in pieces small enough for h to be known in them.
+//! The load ∫ h⁻³ of a mesh, summed over pieces in which h varies little.
 //!
 //! A coarse tetrahedron may span the whole domain while h varies tenfold within: its corners say nothing of its
 //! middle. It is divided along its longest edge until h varies little between the corners and the edge is a bounded number of
@@ -23,7 +23,7 @@ const EDGE_FINE: f64 = 2.0;
 
 /// A piece of a tetrahedron.
 #[derive(Clone, Copy, Debug)]
-pub struct Piece {
+pub struct TetPiece {
     pub points: [Point; 4],
     /// Load ∫ h⁻³ of the piece.
     pub load: f64,
@@ -37,21 +37,21 @@ const LANES: usize = 2;
 const BLOCK: usize = 64;
 const BLOCKS: usize = 32;
 
-/// A wanted length at each point, asked from several threads.
-pub type SizeAt<'a> = dyn Fn(Point) -> f64 + Sync + 'a;
+/// A wanted length at each point, called from several threads.
+pub type SizeFn<'a> = dyn Fn(Point) -> f64 + Sync + 'a;
 
 /// Corners of a tetrahedron and the sizes there.
 type Sized4 = ([Point; 4], [f64; 4]);
 
-/// Adds every piece of every tetrahedron to the sum of its lane; `empty` makes a sum.
+/// Adds every piece of every tetrahedron to the sum of its lane; `empty` creates a sum.
 ///
 /// `see` is shown the corners of all tetrahedra. Which lane a tetrahedron goes to, and in which order, depends on the mesh alone; the caller adds the lanes up in order.
 pub fn tally<P: Pages, T: Send>(
     mesh: &mut Mesh<P>,
-    h: &SizeAt,
+    h: &SizeFn,
     empty: impl Fn() -> T,
-    see: &mut impl FnMut(Point),
-    add: impl Fn(&mut T, &Piece) + Sync,
+    visit_corner: &mut impl FnMut(Point),
+    add: impl Fn(&mut T, &TetPiece) + Sync,
 ) -> [T; LANES] {
     let mut lanes: [(Vec<Sized4>, T); LANES] = std::array::from_fn(|_| (Vec::new(), empty()));
     let mut from = 0;
@@ -62,7 +62,7 @@ pub fn tally<P: Pages, T: Send>(
             let [a, b, c, d] = mesh.ends(&tet);
             let points = [a.point, b.point, c.point, d.point];
             let sizes = [a.h, b.h, c.h, d.h].map(f64::from);
-            points.into_iter().for_each(&mut *see);
+            points.into_iter().for_each(&mut *visit_corner);
             lanes[read / BLOCK % LANES].0.push((points, sizes));
             read += 1;
         }
@@ -81,7 +81,7 @@ pub fn tally<P: Pages, T: Send>(
 }
 
 /// Calls `visit` with every piece of a tetrahedron; `stack` is empty before and after.
-fn divide(tet: Sized4, h: &SizeAt, stack: &mut Vec<Sized4>, visit: &mut impl FnMut(&Piece)) {
+fn divide(tet: Sized4, h: &SizeFn, stack: &mut Vec<Sized4>, visit: &mut impl FnMut(&TetPiece)) {
     let mut next = Some(tet);
     while let Some((points, sizes)) = next.take().or_else(|| stack.pop()) {
         let (edge, [i, j]) = longest(&points);
@@ -111,7 +111,7 @@ fn divide(tet: Sized4, h: &SizeAt, stack: &mut Vec<Sized4>, visit: &mut impl FnM
         } else {
             load_of_tet(1.0, sizes)
         };
-        visit(&Piece { points, load: density * volume.max(0.0), h: mean });
+        visit(&TetPiece { points, load: density * volume.max(0.0), h: mean });
     }
 }
 
@@ -128,7 +128,7 @@ fn longest(p: &[Point; 4]) -> (f64, [usize; 2]) {
 }
 
 /// The load of the whole mesh.
-pub fn load_of<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> f64 {
+pub fn load_of<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn) -> f64 {
     let sums = tally(mesh, h, || 0.0, &mut |_| (), |sum, piece| *sum += piece.load);
     sums.into_iter().sum()
 }

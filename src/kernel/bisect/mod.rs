@@ -6,40 +6,39 @@
 //! 4. `interface`: faces of these final tetrahedra are chosen, by a minimum cut and moves; from then on they are required.
 //! 5. `split`: each side becomes a mesh of its own.
 //!
-//! What later vertices could destroy of the tetrahedra at the interface (Z) is frozen, so that what is valid stays valid; whether
-//! they ever wanted to is counted. When they did not, the interface has cost the Delaunay property nothing.
+//! Tetrahedra at the interface (Z) that later vertices could destroy are frozen, so that valid ones stay valid. Hits on
+//! them are counted; if there are none, the interface has cost the Delaunay property nothing.
 //!
 //! Source: the paper, section 1.1.
 
 mod axes;
-mod child;
+mod child_builder;
 mod core;
 mod flow;
 mod inherit;
 mod interface;
 mod interface_faces;
-mod labels;
 mod load;
+mod load_profile;
 mod moves;
-mod opened;
+mod open_cut;
 mod plane;
 mod report;
-mod split;
-mod spread;
+mod side_labels;
 mod surface;
+mod write_child;
 mod zone;
 
 pub use axes::principal_axes;
 pub use interface::InterfaceReport;
-pub use labels::InterfaceMeasures;
-pub use load::{SizeAt, load_of};
-pub use moves::Steps;
-pub use opened::Opened;
+pub use load::{SizeFn, load_of};
+pub use load_profile::ChosenPlane;
+pub use open_cut::OpenCut;
 pub use plane::{PlaneChoice, choose as choose_plane};
 pub use report::{CutReport, StageSeconds};
-pub use split::write_child;
-pub use spread::ChosenPlane;
+pub use side_labels::InterfaceMeasures;
 pub use surface::{CuttingSurface, Plane};
+pub use write_child::write_child;
 pub use zone::{OutsideZones, WIDTH_MIN, WIDTH_NOISE, Zone};
 
 use std::time::Instant;
@@ -50,30 +49,28 @@ use crate::refine::{Field, Lengths, RefineReport, saturate};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Pages, StorageError};
 
-/// Ways to go, for comparing what each part of the method brings; the default is the method.
+/// Variants of the method, for comparisons; the default is the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Method {
-    /// How the wanted length of an edge is found.
+    /// Lengths of edges: from the field or from the ends.
     pub lengths: Lengths,
-    /// How the cutting plane is chosen.
+    /// Choice of the cutting plane.
     pub plane: PlaneChoice,
-    /// Steps of the choice of the interface.
-    pub steps: Steps,
 }
 
-/// What a cut is to do.
+/// Parameters of a cut.
 #[derive(Clone, Copy)]
 pub struct CutPlan<'a> {
     /// Number of the cut, from 1.
     pub cut: u32,
     /// Share of the load that belongs on the low side.
     pub low: f64,
-    /// Which variant of the method is used.
+    /// Variant of the method.
     pub method: Method,
     /// Zones of the cuts above it.
     pub earlier: &'a [Zone],
     /// Wanted length at a position.
-    pub h: &'a SizeAt<'a>,
+    pub h: &'a SizeFn<'a>,
     /// Box of the whole mesh.
     pub bounds: Aabb,
     /// Settings of the optimization of the core.
@@ -81,7 +78,7 @@ pub struct CutPlan<'a> {
 }
 
 /// A sub-domain whose zone is refined.
-pub struct Refined {
+pub struct RefinedZone {
     /// The zone that was refined.
     pub zone: Zone,
     plane: ChosenPlane,
@@ -107,7 +104,7 @@ pub fn open<P: Pages, Q: Pages>(
     plan: &CutPlan,
     space: &Workspace,
     progress: &dyn Fn(&'static str, u64),
-) -> Result<Opened, StorageError> {
+) -> Result<OpenCut, StorageError> {
     let refined = refine(host, plan, space, progress)?;
     Ok(choose(host, core, plan, refined, None, progress))
 }
@@ -120,7 +117,7 @@ pub fn refine<P: Pages>(
     plan: &CutPlan,
     space: &Workspace,
     progress: &dyn Fn(&'static str, u64),
-) -> Result<Refined, StorageError> {
+) -> Result<RefinedZone, StorageError> {
     let clock = Instant::now();
     let mut seconds = StageSeconds::default();
     progress("choose a plane", 0);
@@ -136,35 +133,36 @@ pub fn refine<P: Pages>(
     };
     let refine = saturate(host, &field, space, &mut |n| progress("refine the zone", n))?;
     seconds.zone = clock.elapsed().as_secs_f64() - seconds.plane;
-    Ok(Refined { zone, plane, refine, seconds })
+    Ok(RefinedZone { zone, plane, refine, seconds })
 }
 
-/// The second part of [`open`]: the interface is chosen in `core`, which must be empty; `faces` learns what it was and is.
+/// The second part of [`open`]: chooses the interface in `core`, which must be empty; `faces` receives the natural and
+/// the chosen faces.
 pub fn choose<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     plan: &CutPlan,
-    refined: Refined,
+    refined: RefinedZone,
     mut faces: Option<&mut InterfaceFaces>,
     progress: &dyn Fn(&'static str, u64),
-) -> Opened {
-    let Refined { zone, plane, refine, mut seconds } = refined;
+) -> OpenCut {
+    let RefinedZone { zone, plane, refine, mut seconds } = refined;
     let clock = Instant::now();
     progress("choose the interface", 0);
-    let rim = core::extract(host, core, &zone.surface);
+    let core_boundary = core::extract(host, core, &zone.surface);
     optimize::run_with(core, plan.optimize, &|_| {});
     seconds.core = clock.elapsed().as_secs_f64();
     let natural = faces.as_mut().map(|f| &mut f.natural);
-    let (interface, labels) =
-        interface::choose(core, &zone.surface, &rim, plan.method.steps, natural);
+    let (interface, labels) = interface::choose(core, &zone.surface, &core_boundary, natural);
     if let Some(faces) = faces {
         faces.chosen = interface_faces::interface_points(core, &labels);
     }
     let vertices = interface_faces::number_interface(core, &labels, plan.cut);
-    let (z_tets, z_enclosed) = labels::enclosed(core, &labels, &zone.surface, plan.h);
-    let layers_least = labels::layers_least(host, core, &labels, &rim, &zone.surface);
+    let (z_tets, z_enclosed) = side_labels::enclosed(core, &labels, &zone.surface, plan.h);
+    let layers_least =
+        side_labels::layers_least(host, core, &labels, &core_boundary, &zone.surface);
     seconds.interface = clock.elapsed().as_secs_f64() - seconds.core;
-    Opened {
+    OpenCut {
         zone,
         report: CutReport {
             plane,
@@ -176,7 +174,7 @@ pub fn choose<P: Pages, Q: Pages>(
             layers_least,
             seconds,
         },
-        rim,
+        core_boundary,
         labels,
     }
 }

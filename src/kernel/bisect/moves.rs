@@ -1,134 +1,143 @@
-//! Moves of tetrahedra from one side of the interface to the other.
+//! Moves tetrahedra from one side of the interface to the other, as long as that lowers its cost.
 
 use super::core::CoreBoundary;
-use super::labels::{Labels, face_cost, is_constrained};
+use super::side_labels::{SideLabels, face_cost, is_constrained};
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
 use crate::reconnect::Ball;
 use tetdb_base::storage::{Pages, check_cancelled};
 
-/// Costs beside those of faces: a tetrahedron with two constrained faces, one with three, a side in two parts around a vertex.
+/// Costs added to those of faces: a tetrahedron with two constrained faces, one with three, a side in two parts around a vertex.
 const TWO: f64 = 2.0;
 const THREE: f64 = 6.0;
 const PINCH: f64 = 60.0;
-/// What a move must gain at least: more than rounding of a sum of some hundred costs.
+/// Least gain of a move: more than rounding of a sum of some hundred costs.
 const GAIN_MIN: f64 = 1e-6;
 /// Passes over the interface.
 const PASSES_MAX: u32 = 10;
-/// Largest ball that is looked at.
+/// Balls with more tetrahedra are not moved.
 const BALL_MAX: usize = 400;
 
-/// Notes about a vertex: no move of its ball to the low side gains, nor to the high side; a side is in several parts around it.
-const SETTLED: [u8; 2] = [1, 2];
+/// Notes about a vertex: moving its ball to the low or the high side gains nothing; a side has several parts around it.
+const NO_GAIN: [u8; 2] = [1, 2];
 const PINCHED: u8 = 4;
-/// Notes about a tetrahedron: moving it alone does not gain; it is being moved.
-const SETTLED_TET: u8 = 1;
+/// Notes about a tetrahedron: moving it alone gains nothing; it is being moved.
+const TET_NO_GAIN: u8 = 1;
 const MOVED: u8 = 2;
 
 /// Scratch of the moves. Memory: one byte for each vertex of the core, three for each tetrahedron.
 pub(super) struct Moves<'a, S> {
-    /// The sides, as they are.
-    pub(super) labels: Labels,
+    /// The current sides.
+    pub labels: SideLabels,
     surface: &'a S,
-    rim: &'a CoreBoundary,
+    boundary: &'a CoreBoundary,
     ball: Ball,
     around: Ball,
-    /// Tetrahedra being moved, then those beside them.
+    /// Tetrahedra being moved, and their neighbors.
     moved: Vec<u32>,
-    beside: Vec<u32>,
+    adjacent: Vec<u32>,
     vertices: Vec<u32>,
-    part: Vec<u8>,
+    part_of: Vec<u8>,
     stack: Vec<usize>,
-    /// Notes by dense number. A move that did not gain is not tried again before a side changes that it was judged by.
-    of_vertices: Vec<u8>,
-    of_tets: Vec<u8>,
-    /// Of a tetrahedron of the ball `around`: its position there. Of any other: what it was in an earlier ball.
+    /// Notes by dense number. A move without gain is tried again only after a side nearby has changed.
+    notes_of_vertices: Vec<u8>,
+    notes_of_tets: Vec<u8>,
+    /// Position of a tetrahedron in the ball `around`; of other tetrahedra, a position in an earlier ball.
     at: Vec<u16>,
 }
 
 impl<'a, S: CuttingSurface> Moves<'a, S> {
-    /// Nothing of `core` but sides may change from now on.
-    pub(super) fn new<P: Pages>(
+    /// `core` must not change while this value is in use; only sides may.
+    pub fn new<P: Pages>(
         core: &Mesh<P>,
-        labels: Labels,
+        labels: SideLabels,
         surface: &'a S,
-        rim: &'a CoreBoundary,
+        boundary: &'a CoreBoundary,
     ) -> Self {
         Self {
             labels,
             surface,
-            rim,
+            boundary,
             ball: Ball::default(),
             around: Ball::default(),
             moved: Vec::new(),
-            beside: Vec::new(),
+            adjacent: Vec::new(),
             vertices: Vec::new(),
-            part: Vec::new(),
+            part_of: Vec::new(),
             stack: Vec::new(),
-            of_vertices: vec![0; dense(core.vertex_ids_end()) as usize],
-            of_tets: vec![0; dense(core.tet_ids_end()) as usize],
+            notes_of_vertices: vec![0; dense(core.vertex_ids_end()) as usize],
+            notes_of_tets: vec![0; dense(core.tet_ids_end()) as usize],
             at: vec![0; dense(core.tet_ids_end()) as usize],
         }
     }
 
     /// Bytes of the notes.
-    pub(super) fn bytes(&self) -> u64 {
-        (self.of_vertices.len() + 3 * self.of_tets.len()) as u64
+    pub fn bytes(&self) -> u64 {
+        (self.notes_of_vertices.len() + 3 * self.notes_of_tets.len()) as u64
     }
 
-    /// Moves until no move gains; returns how many moves there were.
-    pub(super) fn run<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32], steps: Steps) -> u64 {
+    /// Moves tetrahedra until no move gains; returns the number of moves.
+    pub fn run<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
         let mut total = 0;
         for _ in 0..PASSES_MAX {
-            let mut made = 0;
-            if steps.vertex_moves {
-                for v in self.interface_vertices(core, free) {
-                    for (high, settled) in [false, true].into_iter().zip(SETTLED) {
-                        if *self.of_vertex(v) & settled != 0 {
-                            continue;
-                        }
-                        if self.move_ball(core, v, high) {
-                            made += 1;
-                        } else {
-                            *self.of_vertex(v) |= settled;
-                        }
-                    }
-                }
-            }
-            if steps.tet_moves {
-                for &t in free {
-                    if *self.of_tet(t) & SETTLED_TET != 0 {
-                        continue;
-                    }
-                    let tet = core.tet(t);
-                    if self.labels.interface_faces(t, &tet).next().is_some() {
-                        self.moved.clear();
-                        self.moved.push(t);
-                        let high = !self.labels.is_high(t);
-                        if self.try_move(core, high) {
-                            made += 1;
-                        } else {
-                            *self.of_tet(t) |= SETTLED_TET;
-                        }
-                    }
-                }
-            }
-            total += made;
-            if made == 0 {
+            let moves = self.move_balls(core, free) + self.move_tets(core, free);
+            total += moves;
+            if moves == 0 {
                 break;
             }
         }
         total
     }
 
-    #[inline]
-    fn of_vertex(&mut self, v: u32) -> &mut u8 {
-        &mut self.of_vertices[dense(v) as usize]
+    /// Tries to move the balls of the interface's vertices to either side; returns the number of moves.
+    fn move_balls<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
+        let mut moves = 0;
+        for v in self.interface_vertices(core, free) {
+            for (high, no_gain) in [false, true].into_iter().zip(NO_GAIN) {
+                if *self.vertex_notes(v) & no_gain != 0 {
+                    continue;
+                }
+                if self.move_ball(core, v, high) {
+                    moves += 1;
+                } else {
+                    *self.vertex_notes(v) |= no_gain;
+                }
+            }
+        }
+        moves
+    }
+
+    /// Tries to move single tetrahedra at the interface to their other side; returns the number of moves.
+    fn move_tets<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
+        let mut moves = 0;
+        for &t in free {
+            if *self.tet_notes(t) & TET_NO_GAIN != 0 {
+                continue;
+            }
+            let tet = core.tet(t);
+            if self.labels.interface_faces(t, &tet).next().is_none() {
+                continue;
+            }
+            self.moved.clear();
+            self.moved.push(t);
+            let high = !self.labels.is_high(t);
+            if self.try_move(core, high) {
+                moves += 1;
+            } else {
+                *self.tet_notes(t) |= TET_NO_GAIN;
+            }
+        }
+        moves
     }
 
     #[inline]
-    fn of_tet(&mut self, t: u32) -> &mut u8 {
-        &mut self.of_tets[dense(t) as usize]
+    fn vertex_notes(&mut self, v: u32) -> &mut u8 {
+        &mut self.notes_of_vertices[dense(v) as usize]
+    }
+
+    #[inline]
+    fn tet_notes(&mut self, t: u32) -> &mut u8 {
+        &mut self.notes_of_tets[dense(t) as usize]
     }
 
     /// Puts all free tetrahedra around `v` on one side, if that gains.
@@ -149,16 +158,16 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
 
     /// Puts `moved`, all on the other side, on side `high`, or leaves them when that does not gain.
     fn try_move<P: Pages>(&mut self, core: &mut Mesh<P>, high: bool) -> bool {
-        self.list_beside(core);
+        self.gather_adjacent(core);
         let [before, after] = self.costs(core, high);
         for k in 0..self.moved.len() {
-            *self.of_tet(self.moved[k]) &= !MOVED;
+            *self.tet_notes(self.moved[k]) &= !MOVED;
         }
         let gain = before - after;
-        // Without a pinched vertex there is nothing more to gain than faces, which the counts say without looking at balls.
-        let is_pinched = |&v: &u32| self.of_vertices[dense(v) as usize] & PINCHED != 0;
-        let may_mend = self.vertices.iter().any(is_pinched);
-        if gain < if may_mend { -PINCH } else { GAIN_MIN } {
+        // Without a pinched vertex a move gains only by faces, and their costs are known without the balls.
+        let is_pinched = |&v: &u32| self.notes_of_vertices[dense(v) as usize] & PINCHED != 0;
+        let may_unpinch = self.vertices.iter().any(is_pinched);
+        if gain < if may_unpinch { -PINCH } else { GAIN_MIN } {
             return false;
         }
         self.put(high);
@@ -169,7 +178,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
             return false;
         }
         self.put(high);
-        self.unsettle(core);
+        self.clear_no_gain(core);
         if after > 0 || pinches > 0 {
             self.note_pinched(core);
         }
@@ -182,20 +191,20 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
             let v = self.vertices[k];
             let is_pinched = self.parts_around(core, v) > 0;
             let closed = self.around.closed;
-            let note = self.of_vertex(v);
+            let note = self.vertex_notes(v);
             if is_pinched != (*note & PINCHED != 0) {
                 *note ^= PINCHED;
                 if !closed {
-                    // It may have tetrahedra that are not reached from here through faces.
-                    self.of_vertices.iter_mut().for_each(|n| *n &= PINCHED);
-                    self.of_tets.fill(0);
+                    // Some of its tetrahedra may not be reachable from here through faces.
+                    self.notes_of_vertices.iter_mut().for_each(|n| *n &= PINCHED);
+                    self.notes_of_tets.fill(0);
                 }
             }
         }
     }
 
-    /// Forgets what was settled by the sides of `moved`: the moves of what shares a vertex with tetrahedra around their vertices.
-    fn unsettle<P: Pages>(&mut self, core: &mut Mesh<P>) {
+    /// Clears the notes on moves that depend on the sides of `moved`: those of tetrahedra and vertices in the balls of its vertices.
+    fn clear_no_gain<P: Pages>(&mut self, core: &mut Mesh<P>) {
         for k in 0..self.vertices.len() {
             let v = self.vertices[k];
             self.around.tets.clear();
@@ -206,10 +215,10 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
                 }
                 self.around.gather(core, v, t, usize::MAX);
                 for &t in &self.around.tets {
-                    self.of_tets[dense(t) as usize] &= !SETTLED_TET;
+                    self.notes_of_tets[dense(t) as usize] &= !TET_NO_GAIN;
                 }
                 for v in self.around.records.iter().flat_map(Tet::vertices) {
-                    self.of_vertices[dense(v) as usize] &= PINCHED;
+                    self.notes_of_vertices[dense(v) as usize] &= PINCHED;
                 }
             }
         }
@@ -221,37 +230,38 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         }
     }
 
-    /// Lists what is beside `moved` and its vertices, and marks it as being moved.
-    fn list_beside<P: Pages>(&mut self, core: &mut Mesh<P>) {
-        self.beside.clear();
+    /// Gathers the neighbors and the vertices of `moved`, and marks `moved` as being moved.
+    fn gather_adjacent<P: Pages>(&mut self, core: &mut Mesh<P>) {
+        self.adjacent.clear();
         self.vertices.clear();
         for k in 0..self.moved.len() {
-            *self.of_tet(self.moved[k]) |= MOVED;
+            *self.tet_notes(self.moved[k]) |= MOVED;
         }
         for &t in &self.moved {
             let tet = core.tet(t);
             self.vertices.extend(tet.vertices());
             for across in tet.neighbor {
-                if across.exists() && self.of_tets[dense(across.tet()) as usize] & MOVED == 0 {
-                    self.beside.push(across.tet());
+                if across.exists() && self.notes_of_tets[dense(across.tet()) as usize] & MOVED == 0
+                {
+                    self.adjacent.push(across.tet());
                 }
             }
         }
-        for list in [&mut self.beside, &mut self.vertices] {
+        for list in [&mut self.adjacent, &mut self.vertices] {
             list.sort_unstable();
             list.dedup();
         }
     }
 
-    /// Cost of the faces of `moved`, and of `moved` and `beside` as over-constrained: now, and with `moved` on side `high`.
+    /// Cost of the faces of `moved`, and of `moved` and `adjacent` as over-constrained: now, and with `moved` on side `high`.
     fn costs<P: Pages>(&self, core: &mut Mesh<P>, high: bool) -> [f64; 2] {
-        let is_moved = |t: u32| self.of_tets[dense(t) as usize] & MOVED != 0;
+        let is_moved = |t: u32| self.notes_of_tets[dense(t) as usize] & MOVED != 0;
         let mut sums = [0.0; 2];
         for &t in &self.moved {
             let tet = core.tet(t);
             let mut cut = [0; 2];
             for (i, across) in tet.neighbor.into_iter().enumerate() {
-                // A face between two of them is none of the interface, before and after.
+                // A face between two moved tetrahedra is not on the interface, before or after.
                 if !across.exists() || is_moved(across.tet()) {
                     continue;
                 }
@@ -261,17 +271,17 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
             }
             self.add_crowding(&mut sums, &tet, cut);
         }
-        for &t in &self.beside {
+        for &t in &self.adjacent {
             let tet = core.tet(t);
-            let own = self.labels.is_high(t);
+            let side = self.labels.is_high(t);
             let mut cut = [0; 2];
             for (i, across) in tet.neighbor.into_iter().enumerate() {
                 if !across.exists() || tet.is_required(i) {
                     continue;
                 }
                 if is_moved(across.tet()) {
-                    cut[usize::from(high != own)] += 1;
-                } else if self.labels.is_high(across.tet()) != own {
+                    cut[usize::from(high != side)] += 1;
+                } else if self.labels.is_high(across.tet()) != side {
                     cut = cut.map(|n| n + 1);
                 }
             }
@@ -280,12 +290,12 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         sums
     }
 
-    /// Adds what it costs that `tet` has so many faces on the interface that are not required, before and after.
+    /// Adds the cost of a tetrahedron with several constrained faces; `cut` is its number of interface faces that are not required, before and after.
     fn add_crowding(&self, sums: &mut [f64; 2], tet: &Tet, cut: [u32; 2]) {
         if cut == [0; 2] {
             return;
         }
-        let constrained = (0..4).filter(|&i| is_constrained(tet, i, self.rim));
+        let constrained = (0..4).filter(|&i| is_constrained(tet, i, self.boundary));
         let constrained = constrained.count() as u32;
         for (sum, n) in sums.iter_mut().zip(cut).filter(|(_, n)| *n > 0) {
             *sum += match n + constrained {
@@ -296,7 +306,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         }
     }
 
-    /// Parts too many around the vertices of `moved`.
+    /// Sum of [`Self::excess_parts`] over the vertices of `moved`.
     fn pinches<P: Pages>(&mut self, core: &mut Mesh<P>) -> i32 {
         let mut sum = 0;
         for k in 0..self.vertices.len() {
@@ -306,26 +316,26 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         sum
     }
 
-    /// Parts too many around a vertex of `moved`, in the ball of the first of these that has it: around a vertex of the
-    /// surface there may be several balls.
+    /// Excess parts around a vertex of `moved`, in the ball of the first moved tetrahedron that has the vertex: a vertex of
+    /// the surface may have several balls.
     fn parts_around<P: Pages>(&mut self, core: &mut Mesh<P>, v: u32) -> i32 {
         let mut moved = self.moved.iter().copied();
         let start = moved.find(|&t| core.tet(t).local(v).is_some());
-        self.parts_too_many(core, v, start.expect("a vertex of what is moved"))
+        self.excess_parts(core, v, start.expect("a vertex of a moved tetrahedron"))
     }
 
-    /// Parts of the ball of `v` beyond one a side; none where there are more than [`BALL_MAX`] tetrahedra.
-    fn parts_too_many<P: Pages>(&mut self, core: &mut Mesh<P>, v: u32, start: u32) -> i32 {
+    /// Parts of the ball of `v` beyond one for each side; 0 for a ball of more than [`BALL_MAX`] tetrahedra.
+    fn excess_parts<P: Pages>(&mut self, core: &mut Mesh<P>, v: u32, start: u32) -> i32 {
         if !self.around.gather(core, v, start, BALL_MAX) {
             return 0;
         }
         let n = self.around.tets.len();
-        self.part.clear();
+        self.part_of.clear();
         for k in 0..n {
             let high = self.labels.is_high(self.around.tets[k]);
-            self.part.push(u8::from(high));
+            self.part_of.push(u8::from(high));
         }
-        if self.part.iter().all(|&p| p == self.part[0]) {
+        if self.part_of.iter().all(|&p| p == self.part_of[0]) {
             return 0;
         }
         for (k, &t) in self.around.tets.iter().enumerate() {
@@ -334,12 +344,12 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         // 0 and 1: not yet reached, low and high; 2: reached.
         let mut parts = [0; 2];
         for k in 0..n {
-            let side = self.part[k];
+            let side = self.part_of[k];
             if side > 1 {
                 continue;
             }
             parts[usize::from(side)] += 1;
-            self.part[k] = 2;
+            self.part_of[k] = 2;
             self.stack.push(k);
             while let Some(at) = self.stack.pop() {
                 let record = self.around.records[at];
@@ -349,10 +359,10 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
                     if !across.exists() {
                         continue;
                     }
-                    // Through a face at the vertex the way leads to another of its ball.
+                    // A face at the vertex leads to another tetrahedron of its ball.
                     let other = usize::from(self.at[dense(across.tet()) as usize]);
-                    if self.part[other] == side {
-                        self.part[other] = 2;
+                    if self.part_of[other] == side {
+                        self.part_of[other] = 2;
                         self.stack.push(other);
                     }
                 }
@@ -361,14 +371,14 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         parts[0] + parts[1] - 2
     }
 
-    /// Notes and counts the vertices around which a side is in several parts.
-    pub(super) fn count_pinched<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
-        self.of_vertices.iter_mut().for_each(|n| *n &= !PINCHED);
+    /// Notes and counts the vertices around which a side has several parts.
+    pub fn count_pinched<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
+        self.notes_of_vertices.iter_mut().for_each(|n| *n &= !PINCHED);
         let mut pinched = 0;
         for v in self.interface_vertices(core, free) {
             let start = core.tet_of(v);
-            if self.parts_too_many(core, v, start) > 0 {
-                *self.of_vertex(v) |= PINCHED;
+            if self.excess_parts(core, v, start) > 0 {
+                *self.vertex_notes(v) |= PINCHED;
                 pinched += 1;
             }
         }
@@ -387,22 +397,5 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         vertices.sort_unstable();
         vertices.dedup();
         vertices
-    }
-}
-
-/// Steps of the choice, for comparing what each brings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Steps {
-    /// Whether the interface starts from a minimum cut.
-    pub minimum_cut: bool,
-    /// Whether it is improved by moving all tetrahedra around a vertex to the other side.
-    pub vertex_moves: bool,
-    /// Whether it is improved by moving single tetrahedra to the other side.
-    pub tet_moves: bool,
-}
-
-impl Default for Steps {
-    fn default() -> Self {
-        Self { minimum_cut: true, vertex_moves: true, tet_moves: true }
     }
 }

@@ -1,4 +1,4 @@
-//! The plane of a cut: across the longest axis of inertia, where the load to come is shared as wanted.
+//! The plane of a cut: across the longest axis of inertia, where it divides the predicted load as wanted.
 //!
 //! The paper takes the axis of inertia of the centroids of the coarse mesh. Here every piece weighs its load, so that
 //! the axis is that of the mesh to come; the two other axes and those of the coordinates are candidates as well, and the one whose
@@ -7,8 +7,8 @@
 //! Source: the paper, section 1.1, "Defining the cutting plane".
 
 use super::axes::{Moments, principal_axes};
-use super::load::{SizeAt, tally};
-use super::spread::{ChosenPlane, Ramps, Spread};
+use super::load::{SizeFn, tally};
+use super::load_profile::{ChosenPlane, LoadProfile, ProfileBuilder};
 use super::surface::{CuttingSurface, Plane};
 use crate::mesh::Mesh;
 use tetdb_base::geom::{Aabb, Point};
@@ -22,22 +22,18 @@ const SHIFT: f64 = 0.2;
 const GRAZED: f64 = 0.35;
 /// Largest share of the load a shift may bring to the other side: over a dozen cuts it stays within the balance wanted.
 const TOLERANCE: f64 = 0.003;
-/// Lengths along the diagonal where volume stands for load: pieces of some lengths are then as fine as a histogram needs.
-const VOLUME_STEPS: f64 = 200.0;
 /// Least gain in grazed vertices that a shift away from the balanced position must bring, as a share.
 const GAIN: f64 = 0.1;
 
-/// How the plane is chosen.
+/// Choices of the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PlaneChoice {
-    /// As the head of this module says.
+    /// As described at the head of this module.
     #[default]
     Load,
-    /// As the paper says: centroids of the mesh, unweighted; the axis of the largest moment; placed by load.
+    /// As in the paper: centroids of the mesh, unweighted; the axis of the largest moment; placed by load.
     Centroids,
-    /// As `Load`, but shared by volume: what becomes of the balance when sizes do not count.
-    Volume,
-    /// This one, as it is.
+    /// The given plane.
     Given(Plane),
 }
 
@@ -46,28 +42,21 @@ pub enum PlaneChoice {
 /// Sizes must be set at all vertices. `origin` is a point near the mesh: moments are taken about it, so that digits are kept.
 pub fn choose<P: Pages>(
     mesh: &mut Mesh<P>,
-    h: &SizeAt,
+    h: &SizeFn,
     origin: Point,
     low: f64,
     choice: PlaneChoice,
 ) -> ChosenPlane {
-    if choice == PlaneChoice::Volume {
-        let everywhere = bounds(mesh).diagonal() / VOLUME_STEPS;
-        set_sizes(mesh, &|_| everywhere);
-        let chosen = choose(mesh, &|_| everywhere, origin, low, PlaneChoice::Load);
-        set_sizes(mesh, h);
-        return chosen;
-    }
     let spread = match choice {
         PlaneChoice::Given(plane) => {
-            return Spread::gather(mesh, h, plane.normal).at(plane.offset);
+            return LoadProfile::gather(mesh, h, plane.normal).at(plane.offset);
         }
         PlaneChoice::Centroids => {
             let axis = principal_axes(&centroid_moments(mesh, origin))[0];
-            Spread::gather(mesh, h, axis)
+            LoadProfile::gather(mesh, h, axis)
         }
-        PlaneChoice::Load | PlaneChoice::Volume => {
-            let (grid, mut along) = Grid::gather(mesh, h);
+        PlaneChoice::Load => {
+            let (grid, mut profiles) = Grid::gather(mesh, h);
             let mut axes = principal_axes(&grid.moments().matrix()).to_vec();
             axes.extend(COORDINATES);
             // Fewest faces; of equals the first, but an axis along a coordinate is preferred where it costs a hundredth at most.
@@ -79,8 +68,8 @@ pub fn choose<P: Pages>(
             let best = scores.zip(0..).min_by(|a, b| a.0.total_cmp(&b.0));
             let best: usize = best.expect("there are axes").1;
             match best.checked_sub(3) {
-                Some(coordinate) => along.swap_remove(coordinate),
-                None => Spread::gather(mesh, h, axes[best]),
+                Some(coordinate) => profiles.swap_remove(coordinate),
+                None => LoadProfile::gather(mesh, h, axes[best]),
             }
         }
     };
@@ -89,7 +78,7 @@ pub fn choose<P: Pages>(
 }
 
 /// Sets the size of every vertex.
-pub(super) fn set_sizes<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) {
+pub(super) fn set_sizes<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn) {
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, h(p) as f32);
@@ -113,7 +102,7 @@ struct Grid {
 
 impl Grid {
     /// The grid, and the spreads along [`COORDINATES`].
-    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> (Self, Vec<Spread>) {
+    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn) -> (Self, Vec<LoadProfile>) {
         // Nearly always that of the tetrahedra: few vertices have none.
         let around_all = bounds_of_vertices(mesh);
         let (gathered, around_tets) = Self::gather_in(mesh, h, around_all);
@@ -126,19 +115,20 @@ impl Grid {
     /// Gathers in a box, which should be that of the corners of all tetrahedra; returns that too.
     fn gather_in<P: Pages>(
         mesh: &mut Mesh<P>,
-        h: &SizeAt,
+        h: &SizeFn,
         bounds: Aabb,
-    ) -> ((Self, Vec<Spread>), Aabb) {
-        let mut seen = Aabb::EMPTY;
+    ) -> ((Self, Vec<LoadProfile>), Aabb) {
+        let mut bounds_of_tets = Aabb::EMPTY;
         let width = (bounds.high - bounds.low) / CELLS as f64;
         let (low, high) = (bounds.low.to_array(), bounds.high.to_array());
         let empty = || {
-            let along = [0, 1, 2].map(|k| Ramps::new(COORDINATES[k], [low[k], high[k]]));
-            (vec![[0.0; 2]; CELLS * CELLS * CELLS], along)
+            let profiles =
+                [0, 1, 2].map(|k| ProfileBuilder::new(COORDINATES[k], [low[k], high[k]]));
+            (vec![[0.0; 2]; CELLS * CELLS * CELLS], profiles)
         };
-        let see = &mut |p| seen = seen.with(p);
-        let [(mut cells, mut along), others @ ..] =
-            tally(mesh, h, empty, see, |(cells, along), piece| {
+        let visit_corner = &mut |p| bounds_of_tets = bounds_of_tets.with(p);
+        let [(mut cells, mut profiles), others @ ..] =
+            tally(mesh, h, empty, visit_corner, |(cells, profiles), piece| {
                 let [a, b, c, d] = piece.points;
                 let middle = (a + b + c + d) * 0.25;
                 let section = piece.load * piece.h;
@@ -149,19 +139,19 @@ impl Grid {
                 *cell = [cell[0] + piece.load, cell[1] + section];
                 let from = a.min(b).min(c.min(d)).to_array();
                 let to = a.max(b).max(c.max(d)).to_array();
-                for (k, ramps) in along.iter_mut().enumerate() {
+                for (k, ramps) in profiles.iter_mut().enumerate() {
                     ramps.add(from[k], to[k], piece.load, section);
                 }
             });
-        for (more_cells, more_along) in &others {
+        for (more_cells, more_profiles) in &others {
             for (cell, more) in cells.iter_mut().zip(more_cells) {
                 *cell = [cell[0] + more[0], cell[1] + more[1]];
             }
-            (along.iter_mut().zip(more_along)).for_each(|(ramps, more)| ramps.add_all(more));
+            (profiles.iter_mut().zip(more_profiles)).for_each(|(ramps, more)| ramps.add_all(more));
         }
         let grid = Self { low: bounds.low, width, cells };
-        let along = along.into_iter().map(Ramps::sum_up).collect();
-        ((grid, along), seen)
+        let profiles = profiles.into_iter().map(ProfileBuilder::sum_up).collect();
+        ((grid, profiles), bounds_of_tets)
     }
 
     /// Middles of the cells with something in them.
@@ -182,13 +172,13 @@ impl Grid {
         moments
     }
 
-    fn spread(&self, axis: Point) -> Spread {
+    fn spread(&self, axis: Point) -> LoadProfile {
         let half = (self.width * 0.5).abs().dot(axis.abs());
         let ends = self.filled().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], (p, _)| {
             let s = axis.dot(p);
             [l.min(s - half), h.max(s + half)]
         });
-        let mut ramps = Ramps::new(axis, ends);
+        let mut ramps = ProfileBuilder::new(axis, ends);
         for (middle, [load, section]) in self.filled() {
             let s = axis.dot(middle);
             ramps.add(s - half, s + half, load, section);
@@ -200,18 +190,6 @@ impl Grid {
 fn bounds_of_vertices<P: Pages>(mesh: &mut Mesh<P>) -> Aabb {
     let vertices = mesh.vertex_ids();
     vertices.fold(Aabb::EMPTY, |bounds, v| bounds.with(mesh.point(v)))
-}
-
-fn bounds<P: Pages>(mesh: &mut Mesh<P>) -> Aabb {
-    let mut bounds = Aabb::EMPTY;
-    let mut from = 0;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        for p in mesh.points(&tet) {
-            bounds = bounds.with(p);
-        }
-    }
-    bounds
 }
 
 fn centroid_moments<P: Pages>(mesh: &mut Mesh<P>, origin: Point) -> [[f64; 3]; 3] {
@@ -226,7 +204,7 @@ fn centroid_moments<P: Pages>(mesh: &mut Mesh<P>, origin: Point) -> [[f64; 3]; 3
 }
 
 /// Moves the plane a little where it would graze fixed vertices.
-fn shift<P: Pages>(mesh: &mut Mesh<P>, chosen: ChosenPlane, spread: &Spread) -> ChosenPlane {
+fn shift<P: Pages>(mesh: &mut Mesh<P>, chosen: ChosenPlane, spread: &LoadProfile) -> ChosenPlane {
     let plane = chosen.plane;
     let share = chosen.load[0] / chosen.load[1];
     let reach = [-TOLERANCE, TOLERANCE].map(|t| (spread.quantile(share + t) - plane.offset).abs());

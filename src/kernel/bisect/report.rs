@@ -1,23 +1,23 @@
-//! What a cut did.
+//! The report of a cut.
 
 use super::interface::InterfaceReport;
-use super::spread::ChosenPlane;
+use super::load_profile::ChosenPlane;
 use crate::refine::RefineReport;
 
-/// How a cut went.
+/// The report of a cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutReport {
     /// The plane and the load on its sides.
     pub plane: ChosenPlane,
-    /// What the saturation of the zone did.
+    /// Report of the saturation of the zone.
     pub refine: RefineReport,
-    /// What the choice of the interface did.
+    /// Report of the choice of the interface.
     pub interface: InterfaceReport,
     /// Interface vertices of the cut, which bear its number.
     pub vertices: u32,
     /// Tetrahedra with a face on the interface, and those whose circumsphere lies in the refined zone.
     pub z_tets: u64,
-    /// Those of them whose circumsphere lies in the refined zone.
+    /// Of these, tetrahedra whose circumsphere lies in the refined zone.
     pub z_enclosed: u64,
     /// Tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone, at least; three
     /// stands for more.

@@ -1,8 +1,8 @@
-//! What divides space in two.
+//! Surfaces that divide space in two.
 
 use tetdb_base::geom::Point;
 
-/// A surface that cuts a sub-domain. Everything but the choice of a plane asks only this of it.
+/// A surface that cuts a sub-domain. Everything but the choice of a plane uses only this trait.
 pub trait CuttingSurface {
     /// Signed distance of `p`, in input units: negative on the low side.
     fn distance(&self, p: Point) -> f64;
@@ -10,10 +10,10 @@ pub trait CuttingSurface {
     /// Unit normal at `p`, pointing to the high side.
     fn normal(&self, p: Point) -> Point;
 
-    /// The parameters between which the way from `a` to `b` may be nearer than `width`; `None` when it nowhere is.
+    /// The parameters between which the segment from `a` to `b` may be nearer than `width`; `None` if it never is.
     fn band(&self, a: Point, b: Point, width: f64) -> Option<[f64; 2]>;
 
-    /// The parameter at which the way from `a` to `b` is nearest.
+    /// The parameter at which the segment from `a` to `b` is nearest.
     fn nearest(&self, a: Point, b: Point) -> f64;
 }
 

@@ -11,7 +11,7 @@ use tetdb_base::geom::{Point, mix};
 /// Half the width of the zone at its narrowest, in units of the wanted length. Circumspheres of a saturated mesh have radii below
 /// 1.03 h, and interface vertices stay within 1.4 h: from 3.5 on no later vertex reaches a tetrahedron at the interface.
 pub const WIDTH_MIN: f64 = 4.0;
-/// How much wider the noise makes it at most.
+/// Largest additional width from the noise.
 pub const WIDTH_NOISE: f64 = 2.0;
 /// Wavelength of the noise in units of h.
 const WAVELENGTH: f64 = 1.5;
@@ -19,7 +19,7 @@ const WAVELENGTH: f64 = 1.5;
 /// A refined zone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Zone {
-    /// Number of the cut: makes its noise its own.
+    /// Number of the cut, which seeds its noise.
     pub cut: u32,
     /// The plane in the middle of the zone.
     pub surface: Plane,
@@ -36,14 +36,14 @@ impl Zone {
         WIDTH_MIN + WIDTH_NOISE * noise(foot / cell, seed)
     }
 
-    /// Whether no vertex may be added at `p` after the cut. At its noisy limit the zone still has holes that
+    /// Returns whether no vertex may be added at `p` after the cut. At its noisy limit the zone still has holes that
     /// only its surroundings, once refined, let one fill; a tetrahedron at the interface reaches nowhere near there.
     #[inline]
     pub fn is_final(&self, p: Point, h: f64) -> bool {
         self.surface.distance(p).abs() <= WIDTH_MIN * h
     }
 
-    /// Whether `p`, where the wanted length is `h`, lies in the zone.
+    /// Returns whether `p`, where the wanted length is `h`, lies in the zone.
     #[inline]
     pub fn holds(&self, p: Point, h: f64) -> bool {
         let s = self.surface.distance(p).abs();
@@ -51,15 +51,15 @@ impl Zone {
     }
 }
 
-/// The zone of the cut at hand, without what earlier cuts have settled.
+/// The zone of the current cut, without the zones of earlier cuts.
 pub(super) struct InZone<'a> {
     pub zone: &'a Zone,
     pub earlier: &'a [Zone],
     pub h: &'a (dyn Fn(Point) -> f64 + Sync),
 }
 
-/// How far from the surface a zone can reach, in units of h at a point not yet in it: by a third wider than it is, for
-/// the size may grow on the way.
+/// Reach of a zone from the surface, in units of h at a point not yet in it: a third more than its width, because the
+/// size may grow on the way.
 const REACH: f64 = 1.3 * (WIDTH_MIN + WIDTH_NOISE);
 
 impl PlacementRule for InZone<'_> {
@@ -97,9 +97,9 @@ impl PlacementRule for InZone<'_> {
     }
 }
 
-/// Whether one zone holds both ends of an edge: it was saturated there, and what optimization made of it since is final.
+/// Returns whether one zone holds both ends of an edge: the edge was saturated there, and its optimized form is final.
 ///
-/// Rounded sizes tell most edges that are not without asking for those of the field.
+/// Rounded sizes rule out most edges without a call of the field.
 fn both_in_one(
     zones: &[Zone],
     h: &dyn Fn(Point) -> f64,
@@ -116,7 +116,7 @@ fn both_in_one(
     (zones.iter()).any(|zone| zone.is_final(a, ha) && zone.is_final(b, hb))
 }
 
-/// Makes a size that was rounded to `f32` at least what it was.
+/// Factor that undoes rounding to `f32` downwards.
 const ROUNDED_UP: f64 = 1.0 + 1e-6;
 
 /// Everywhere but in the zones of earlier cuts.

@@ -8,11 +8,11 @@
 //! ```
 //! Each point takes one crossed part away and adds none, so the number of points is bounded by that of crossings.
 
+use super::complex::{TetComplex, edge_key};
 use super::exact::ExactPoint;
 use super::find::Outcome;
 use super::flips::Flipper;
-use super::patch::Patch;
-use super::space::{Space, edge_key};
+use super::patch::RecoveryPatch;
 use super::target::RecoveryTarget;
 use super::walk::{Exit, exit_vertex, shell};
 use tetdb_base::geom::Dyadic;
@@ -23,14 +23,14 @@ const POINTS_MAX: usize = 2000;
 /// Fineness of places, in terms of some 50 bits: coordinates of doubles, divided, can differ by less than one term shows.
 pub(super) const TERMS: [u32; 4] = [2, 4, 8, 16];
 
-/// Why a patch could not be finished.
+/// Reasons why a patch could not be finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Trouble {
+pub(super) enum PatchFailure {
     /// A vertex of the surface lies on the segment or facet.
     Vertex(u32),
     /// A required face is crossed.
     Crossed([u32; 3]),
-    /// No double (or exact combination) lies in the room left.
+    /// No double (or exact combination) lies in the open region left.
     Precision(&'static str),
     /// More points or steps than allowed.
     TooMuch,
@@ -38,9 +38,9 @@ pub(super) enum Trouble {
     Broken(&'static str),
 }
 
-impl<P: Pages> Patch<'_, P> {
+impl<P: Pages> RecoveryPatch<'_, P> {
     /// Makes the segment `a b` a chain of edges; returns its vertices from `a` to `b`.
-    pub(super) fn chain(&mut self, a: u32, b: u32) -> Result<Vec<u32>, Trouble> {
+    pub(super) fn chain(&mut self, a: u32, b: u32) -> Result<Vec<u32>, PatchFailure> {
         let mut chain = vec![a];
         while chain.len() < POINTS_MAX {
             let h = *chain.last().expect("starts with a");
@@ -52,22 +52,22 @@ impl<P: Pages> Patch<'_, P> {
             let next = match exit_vertex(self, h, b) {
                 Exit::Reached(_) => b,
                 Exit::Vertex(v) if self.is_steiner(v) => v,
-                Exit::Vertex(v) => return Err(Trouble::Vertex(v)),
-                Exit::Lost => return Err(Trouble::Broken("a segment leaves the mesh")),
+                Exit::Vertex(v) => return Err(PatchFailure::Vertex(v)),
+                Exit::Lost => return Err(PatchFailure::Broken("a segment leaves the mesh")),
                 Exit::Face(face) => {
                     let tet = self.tet(face.tet());
                     if tet.is_required(face.face()) {
-                        return Err(Trouble::Crossed(tet.face(face.face())));
+                        return Err(PatchFailure::Crossed(tet.face(face.face())));
                     }
                     let beyond = self.across(face.tet(), face.face());
                     self.split(a, b, &[face.tet(), beyond.tet()])?
                 }
                 Exit::Edge { tet, c, d } => {
                     let Some(around) = shell(self, tet, c, d) else {
-                        return Err(Trouble::Broken("a crossed edge is on the hull"));
+                        return Err(PatchFailure::Broken("a crossed edge is on the hull"));
                     };
                     if around.required {
-                        return Err(Trouble::Crossed([c, d, d]));
+                        return Err(PatchFailure::Crossed([c, d, d]));
                     }
                     self.split(a, b, &around.tets)?
                 }
@@ -79,14 +79,15 @@ impl<P: Pages> Patch<'_, P> {
                 return Ok(chain);
             }
         }
-        Err(Trouble::TooMuch)
+        Err(PatchFailure::TooMuch)
     }
 
     /// Puts a point of the segment `a b` into the cavity, near the middle of the piece that sees all of it.
     ///
-    /// Where that piece is shorter than the effort says, a point farther on is tried first, in a cavity that grows to be
-    /// seen: what has no room here has none either when it leaves the surface.
-    fn split(&mut self, a: u32, b: u32, cavity: &[u32]) -> Result<u32, Trouble> {
+    /// If that piece is shorter than the effort's limit, a point farther on is tried first, in a cavity that grows
+    /// until the point sees all of it: a point with too little clearance here would have none either when it leaves the
+    /// surface.
+    fn split(&mut self, a: u32, b: u32, cavity: &[u32]) -> Result<u32, PatchFailure> {
         let outer = self.outer_faces(cavity);
         let at: Vec<[Dyadic; 2]> = outer
             .iter()
@@ -129,13 +130,13 @@ impl<P: Pages> Patch<'_, P> {
                 }
             }
         }
-        Err(Trouble::Precision("doubles leave no place on its edges"))
+        Err(PatchFailure::Precision("doubles leave no place on its edges"))
     }
 }
 
-/// Where the segment sees all faces from inside, as its start and length in shares of the segment.
+/// The part of the segment that sees all faces from inside, as start and length in shares of the segment.
 ///
-/// `at` has the volumes of each face with both ends; `terms` says how finely they are divided.
+/// `at` has the volumes of each face with both ends; `terms` is the precision of divisions.
 fn seen_piece(at: &[[Dyadic; 2]], terms: u32) -> Option<(Dyadic, Dyadic)> {
     let (mut low, mut high) = (Dyadic::from(0.0), Dyadic::from(1.0));
     for [at_a, at_b] in at {

@@ -1,16 +1,16 @@
-//! A flat part whose rim is chains becomes a set of faces, through points that lie in it exactly.
+//! Covers a flat part whose outline consists of chains by faces, through points that lie exactly in it.
 //!
-//! From each directed edge with the facet on its left, the shell shows what lies there: a face in the facet's
-//! plane, or a tetrahedron that the plane cuts. The latter has an edge with its ends on both sides, and that edge
-//! crosses the facet; a point of the facet near the crossing, joined to the shell of that edge, takes it away and
-//! adds no edge with ends on both sides.
+//! From each directed edge with the facet on its left, the shell shows the next part: a face in the facet's plane, or a
+//! tetrahedron that the plane cuts. The latter has an edge with its ends on both sides, and that edge crosses the
+//! facet. A point of the facet near the crossing, joined to the shell of that edge, removes the edge and adds no edge
+//! with ends on both sides.
 
-use super::chain::{TERMS, Trouble};
+use super::chain::{PatchFailure, TERMS};
+use super::complex::{TetComplex, edge_key};
 use super::exact::ExactPoint;
-use super::flat::FlatPart;
+use super::flat_parts::FlatPart;
 use super::flips::Flipper;
-use super::patch::Patch;
-use super::space::{Space, edge_key};
+use super::patch::RecoveryPatch;
 use super::target::RecoveryTarget;
 use super::walk::{find_edge, shell};
 use tetdb_base::geom::{Dyadic, IdSet};
@@ -19,7 +19,7 @@ use tetdb_base::storage::Pages;
 /// Points in one facet.
 const POINTS_MAX: usize = 5000;
 
-/// What lies on the left of a directed edge.
+/// The face or crossing on the left of a directed edge.
 enum Left {
     /// The face to this vertex.
     Face(u32),
@@ -27,19 +27,19 @@ enum Left {
     Crossing(u32, u32, u32),
 }
 
-impl<P: Pages> Patch<'_, P> {
-    /// Covers a flat part by faces; `rim` are the edges of its boundary, in its direction.
+impl<P: Pages> RecoveryPatch<'_, P> {
+    /// Covers a flat part by faces; `outline` are the edges of its boundary, in its direction.
     ///
     /// Returns the faces, each in the direction of the part.
     pub(super) fn cover(
         &mut self,
         part: &FlatPart,
-        rim: &[(u32, u32)],
-    ) -> Result<Vec<[u32; 3]>, Trouble> {
+        outline: &[(u32, u32)],
+    ) -> Result<Vec<[u32; 3]>, PatchFailure> {
         let f = part.facets[0];
-        let on_rim: IdSet<(u32, u32)> = rim.iter().copied().collect();
+        let on_outline: IdSet<(u32, u32)> = outline.iter().copied().collect();
         let known: IdSet<u32> = part.facets.iter().flatten().copied().collect();
-        let mut open: Vec<(u32, u32)> = on_rim.iter().copied().collect();
+        let mut open: Vec<(u32, u32)> = on_outline.iter().copied().collect();
         open.sort_unstable();
         let mut done: IdSet<(u32, u32)> = IdSet::default();
         let mut faces = Vec::new();
@@ -51,13 +51,13 @@ impl<P: Pages> Patch<'_, P> {
             match self.left_of(f, p, q)? {
                 Left::Face(r) => {
                     if !known.contains(&r) && !self.is_steiner(r) {
-                        return Err(Trouble::Vertex(r));
+                        return Err(PatchFailure::Vertex(r));
                     }
                     faces.push([p, q, r]);
                     done.extend([(p, q), (q, r), (r, p)]);
                     for (x, y) in [(q, r), (r, p)] {
                         self.kept.insert(edge_key(x, y));
-                        if !on_rim.contains(&(x, y)) && !done.contains(&(y, x)) {
+                        if !on_outline.contains(&(x, y)) && !done.contains(&(y, x)) {
                             open.push((y, x));
                         }
                     }
@@ -66,7 +66,7 @@ impl<P: Pages> Patch<'_, P> {
                     open.push((p, q));
                     points += 1;
                     if points > POINTS_MAX * part.facets.len() {
-                        return Err(Trouble::TooMuch);
+                        return Err(PatchFailure::TooMuch);
                     }
                     let effort = self.effort;
                     let target = match part.facets.len() {
@@ -86,10 +86,10 @@ impl<P: Pages> Patch<'_, P> {
         Ok(faces)
     }
 
-    fn left_of(&mut self, f: [u32; 3], p: u32, q: u32) -> Result<Left, Trouble> {
+    fn left_of(&mut self, f: [u32; 3], p: u32, q: u32) -> Result<Left, PatchFailure> {
         let around = find_edge(self, p, q)
             .and_then(|t| shell(self, t, p, q))
-            .ok_or(Trouble::Broken("an edge of a facet is not there"))?;
+            .ok_or(PatchFailure::Broken("an edge of a facet is not there"))?;
         let n = around.ring.len();
         let side: Vec<f64> =
             around.ring.iter().map(|&r| self.orient([f[0], f[1], f[2], r])).collect();
@@ -97,9 +97,10 @@ impl<P: Pages> Patch<'_, P> {
             let j = (i + 1) % n;
             let (x, y) = (around.ring[i], around.ring[j]);
             if side[i] == 0.0 {
-                // A reference off the plane tells left from right.
-                let k =
-                    (0..n).find(|&k| side[k] != 0.0).ok_or(Trouble::Broken("a shell is flat"))?;
+                // A reference off the plane distinguishes left from right.
+                let k = (0..n)
+                    .find(|&k| side[k] != 0.0)
+                    .ok_or(PatchFailure::Broken("a shell is flat"))?;
                 let turn = self.orient([p, q, x, around.ring[k]]);
                 if (turn > 0.0) == (side[k] > 0.0) && turn != 0.0 {
                     return Ok(Left::Face(x));
@@ -114,7 +115,7 @@ impl<P: Pages> Patch<'_, P> {
                 }
             }
         }
-        Err(Trouble::Broken("nothing lies on the left of a facet's edge"))
+        Err(PatchFailure::Broken("nothing lies on the left of a facet's edge"))
     }
 
     /// The facet of `part` that the edge passes through, and where: volumes of the edge with the sides opposite the corners, as
@@ -138,21 +139,22 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// Takes the edge `above below` away by a point of the part near its crossing.
-    fn pierce(&mut self, part: &FlatPart, above: u32, below: u32) -> Result<(), Trouble> {
+    fn pierce(&mut self, part: &FlatPart, above: u32, below: u32) -> Result<(), PatchFailure> {
         let around = find_edge(self, above, below)
             .and_then(|t| shell(self, t, above, below))
-            .ok_or(Trouble::Broken("a crossing edge is on the hull"))?;
+            .ok_or(PatchFailure::Broken("a crossing edge is on the hull"))?;
         if around.required {
-            return Err(Trouble::Crossed([above, below, below]));
+            return Err(PatchFailure::Crossed([above, below, below]));
         }
         let outer = self.outer_faces(&around.tets);
-        let (f, [over_a, over_b, over_c]) =
-            self.facet_at(part, above, below).ok_or(Trouble::Broken("an edge crosses no facet"))?;
+        let (f, [over_a, over_b, over_c]) = self
+            .facet_at(part, above, below)
+            .ok_or(PatchFailure::Broken("an edge crosses no facet"))?;
         let [a, b, c] = f.map(|v| self.position(v));
         let sum = over_a.plus(&over_b).plus(&over_c);
         let share = |terms| Some((over_b.over(&sum, terms)?, over_c.over(&sum, terms)?));
-        let (s, t) = share(TERMS[0]).ok_or(Trouble::Broken("an edge crosses no facet"))?;
-        // Room around the crossing: a fraction of the distance to the ring.
+        let (s, t) = share(TERMS[0]).ok_or(PatchFailure::Broken("an edge crosses no facet"))?;
+        // Clearance around the crossing: a fraction of the distance to the ring.
         let (u, v) = (b - a, c - a);
         let crossing = a + u * s.estimate() + v * t.estimate();
         let room = around
@@ -193,6 +195,6 @@ impl<P: Pages> Patch<'_, P> {
                 return Ok(());
             }
         }
-        Err(Trouble::Precision("doubles leave no place on it"))
+        Err(PatchFailure::Precision("doubles leave no place on it"))
     }
 }

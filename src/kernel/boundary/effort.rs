@@ -1,17 +1,17 @@
-//! The same patch tried in several ways.
+//! Several attempts at the same patch.
 //!
-//! Where doubles leave little room, it depends on what was flipped before and where the first points went whether the last
-//! one finds a place. Nothing of a failed attempt is written, so others can follow.
+//! Where doubles leave little clearance, success depends on earlier flips and on the places of the first points. A
+//! failed attempt writes nothing, so others can follow.
 
-/// One way to work on a patch.
+/// Parameters of one attempt at a patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort {
-    /// How deep flips nest before a point is put, and how many ring searches they may take.
+    /// Nesting depth of flips before a point is put, and the number of ring searches.
     pub flip_level: u32,
     pub flip_work: u32,
     /// A piece of a segment shorter than this share is used only when no other is found.
     pub piece_min: f64,
-    /// Where in its piece of a segment a point goes first.
+    /// First place of a point in its piece of a segment.
     pub lean: f64,
     /// Segments from their other ends, facets and vertices in the other order.
     pub reversed: bool,
@@ -19,8 +19,8 @@ pub(super) struct Effort {
     pub exact: bool,
 }
 
-/// From the cheapest on. The first ones recover all but a few of a hundred thousand random cuts, the exact ones what is left
-/// where doubles have an answer at all.
+/// From the cheapest on. The first ones recover all but a few of a hundred thousand random cuts. The exact ones recover
+/// the rest, where doubles have an answer at all.
 pub(super) const EFFORTS: [Effort; 13] = {
     let first = Effort {
         flip_level: 1,

@@ -21,15 +21,15 @@ impl fmt::Display for FacetPlace {
     }
 }
 
-/// Why a surface did not become the boundary of volumes.
+/// Reasons why a surface did not become the boundary of volumes.
 #[derive(Debug, Error)]
 pub enum BoundaryError {
-    /// These triangles could not be made faces of the mesh.
+    /// Triangles that could not be made faces of the mesh.
     #[error("{} triangles could not be recovered, the first is {}: {reason}{}", facets.len(), facets[0], nearness.map_or(String::new(), |s| format!("; {s}")))]
     NotRecovered {
         /// Never empty.
         facets: Vec<FacetPlace>,
-        /// Why they could not be, in a few words.
+        /// The reason, in a few words.
         reason: &'static str,
         /// The narrowest place around them.
         nearness: Option<Nearness>,
@@ -44,21 +44,21 @@ pub enum BoundaryError {
         /// The triangle it lies on.
         facet: Box<FacetPlace>,
     },
-    /// A seed says something that cannot be.
+    /// A seed with an impossible meaning.
     #[error("{message}")]
     Seed {
-        /// Which seed, and what it contradicts.
+        /// The seed, and its contradiction.
         message: String,
-        /// Where it is.
+        /// Position of the seed.
         point: Point,
     },
-    /// Regions are to be filled by seeds, and there is none.
+    /// Regions are to be filled by seeds, but there is no seed.
     #[error("neither a region seed nor a hole is given, and regions are filled by seeds")]
     NoSeed,
-    /// What triangles point out of cannot be decided.
+    /// The outside of the triangles cannot be decided.
     #[error("the triangles do not point out of the same volumes: {what}")]
     Orientation {
-        /// Which triangles contradict each other.
+        /// The contradictory triangles.
         what: String,
     },
 }

@@ -4,13 +4,13 @@
 //! two when `s` and `t` are. Signs of orientations of such points are found without rounding.
 //! They exist in memory only, while a patch is at work.
 
-use tetdb_base::geom::{Dyadic, Pair, Point, orient};
+use tetdb_base::geom::{DoublePair, Dyadic, Point, orient};
 
 /// A point whose coordinates are exact values.
 #[derive(Clone, Debug)]
 pub(super) struct ExactPoint {
     exact: [Dyadic; 3],
-    /// What the exact one rounds to, and what the rest rounds to.
+    /// The exact point, rounded; and the remainder, rounded.
     rounded: Point,
     rest: Point,
 }
@@ -24,12 +24,12 @@ impl ExactPoint {
     }
 
     /// A point as it is.
-    pub(super) fn explicit(p: Point) -> Self {
+    pub fn explicit(p: Point) -> Self {
         Self { exact: p.to_array().map(Dyadic::from), rounded: p, rest: Point::ZERO }
     }
 
     /// `base + Σ share · (to - base)`.
-    pub(super) fn combination(base: Point, shares: &[(Point, &Dyadic)]) -> Self {
+    pub fn combination(base: Point, shares: &[(Point, &Dyadic)]) -> Self {
         let from = base.to_array().map(Dyadic::from);
         let mut sum = from.clone();
         for (to, share) in shares {
@@ -42,25 +42,25 @@ impl ExactPoint {
     }
 
     /// `self + by`, of few bits: each coordinate is off by less than `slack`.
-    pub(super) fn moved(&self, by: Point, slack: &Dyadic) -> Self {
+    pub fn moved(&self, by: Point, slack: &Dyadic) -> Self {
         let by = by.to_array().map(Dyadic::from);
         Self::new([0, 1, 2].map(|i| self.exact[i].plus(&by[i]).shortened(slack)))
     }
 
     /// From `self` to `other`, rounded after the subtraction.
-    pub(super) fn offset(&self, other: &Self) -> Point {
+    pub fn offset(&self, other: &Self) -> Point {
         Point::from_array([0, 1, 2].map(|i| other.exact[i].minus(&self.exact[i]).estimate()))
     }
 
     /// Rounded to the nearest doubles or nearly so.
-    pub(super) fn rounded(&self) -> Point {
+    pub fn rounded(&self) -> Point {
         self.rounded
     }
 }
 
 /// A position, rounded, with the exact one where they differ.
 #[derive(Clone, Copy)]
-pub(super) struct Placed<'a> {
+pub(super) struct PlacedPoint<'a> {
     pub point: Point,
     pub exact: Option<&'a ExactPoint>,
 }
@@ -68,20 +68,21 @@ pub(super) struct Placed<'a> {
 /// Forward error of the determinant in doubles, as in `geom`.
 const ORIENT_BOUND: f64 = 5.2e-15;
 const EPSILON: f64 = f64::EPSILON;
-/// Forward error of the determinant in pairs of doubles: nine products of 2^-102 and their sums of 2^-104, with room to spare.
+/// Forward error of the determinant in pairs of doubles: nine products of 2^-102 and their sums of 2^-104, with slack.
 const PAIR_BOUND: f64 = EPSILON * EPSILON * 1024.0;
-/// How far a coordinate's difference is off in pairs, as a share of the coordinates: the rests are at most 2^-53 of them, and rounded a few times.
+/// Error of a coordinate difference in pairs, as a share of the coordinates: the rests are at most 2^-53 of them, and
+/// rounded a few times.
 const PAIR_OFF: f64 = EPSILON * EPSILON * 4.0;
 
 /// Six times the signed volume; the sign is exact.
 #[cfg(test)]
-pub(super) fn orient_placed(p: [Placed<'_>; 4]) -> f64 {
+pub(super) fn orient_placed(p: [PlacedPoint<'_>; 4]) -> f64 {
     (orient_filtered(p).or_else(|| orient_in_pairs(p)))
         .unwrap_or_else(|| orient_exact(p).estimate())
 }
 
 /// Six times the signed volume, where doubles suffice for its sign.
-pub(super) fn orient_filtered(p: [Placed<'_>; 4]) -> Option<f64> {
+pub(super) fn orient_filtered(p: [PlacedPoint<'_>; 4]) -> Option<f64> {
     if p.iter().all(|p| p.exact.is_none()) {
         return Some(orient(p[0].point, p[1].point, p[2].point, p[3].point));
     }
@@ -99,13 +100,13 @@ pub(super) fn orient_filtered(p: [Placed<'_>; 4]) -> Option<f64> {
 }
 
 /// Six times the signed volume, where twice the bits of doubles suffice for its sign.
-pub(super) fn orient_in_pairs(p: [Placed<'_>; 4]) -> Option<f64> {
+pub(super) fn orient_in_pairs(p: [PlacedPoint<'_>; 4]) -> Option<f64> {
     let [a, b, c, d] = p.map(|p| match p.exact {
         Some(exact) => (exact.rounded, exact.rest),
         None => (p.point, Point::ZERO),
     });
-    let [u, v, w] =
-        [b, c, d].map(|q| [0, 1, 2].map(|i| Pair::difference(q.0[i], a.0[i], q.1[i] - a.1[i])));
+    let [u, v, w] = [b, c, d]
+        .map(|q| [0, 1, 2].map(|i| DoublePair::difference(q.0[i], a.0[i], q.1[i] - a.1[i])));
     let terms = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
     let [x, y, z] = terms.map(|(i, j, k)| u[i].times(v[j].times(w[k]).minus(v[k].times(w[j]))));
     let det = x.plus(y).plus(z).value();
@@ -122,7 +123,7 @@ pub(super) fn orient_in_pairs(p: [Placed<'_>; 4]) -> Option<f64> {
 
 /// Six times the signed volume, without rounding.
 #[cold]
-pub(super) fn orient_exact(p: [Placed<'_>; 4]) -> Dyadic {
+pub(super) fn orient_exact(p: [PlacedPoint<'_>; 4]) -> Dyadic {
     let [a, b, c, d] = p.map(|p| match p.exact {
         Some(exact) => exact.clone(),
         None => ExactPoint::explicit(p.point),
@@ -147,13 +148,13 @@ mod tests {
         let b = Point::new(1.9, -0.2, 0.45);
         let c = Point::new(-0.6, 0.33, 1.7);
         let d = Point::new(0.2, 0.9, 5.3);
-        let place = |point| Placed { point, exact: None };
+        let place = |point| PlacedPoint { point, exact: None };
         for k in 1..50 {
             let [s, t] = [97.3, 131.7].map(|n| Dyadic::from(f64::from(k) / n));
             let on_edge = ExactPoint::combination(a, &[(b, &s)]);
             let in_face = ExactPoint::combination(a, &[(b, &s), (c, &t)]);
-            let x = Placed { point: on_edge.rounded(), exact: Some(&on_edge) };
-            let y = Placed { point: in_face.rounded(), exact: Some(&in_face) };
+            let x = PlacedPoint { point: on_edge.rounded(), exact: Some(&on_edge) };
+            let y = PlacedPoint { point: in_face.rounded(), exact: Some(&in_face) };
             assert_eq!(orient_placed([place(a), place(b), x, place(d)]), 0.0);
             assert_eq!(orient_placed([place(a), place(b), place(c), y]), 0.0);
             assert_eq!(orient_placed([x, place(b), place(c), y]), 0.0);

@@ -1,16 +1,16 @@
-//! Which segments and facets the mesh has, and recovery of one that is missing.
+//! Finds segments and facets in the mesh, and recovers a missing one.
 
+use super::complex::TetComplex;
 use super::flips::{CROSSINGS_MAX, Flipper};
-use super::space::Space;
 use super::target::RecoveryTarget;
 use super::walk::{Exit, crossings, edge_at, find_edge, opposite, shell};
 use crate::mesh::FaceRef;
 use tetdb_base::geom::IdSet;
 
-/// Where facet `a b c` stands.
+/// State of facet `a b c` in the mesh.
 #[derive(Clone, Debug)]
 pub(super) enum SearchResult {
-    /// It is this face.
+    /// The facet is this face.
     Face(FaceRef),
     /// Edge `a b` is there, the face is not; the tetrahedron whose inside it enters from that edge, if one.
     Edge(Option<u32>),
@@ -18,7 +18,7 @@ pub(super) enum SearchResult {
 }
 
 /// Looks for the face `a b c` around its edge `a b`.
-pub(super) fn find_face<S: Space>(s: &mut S, [a, b, c]: [u32; 3]) -> SearchResult {
+pub(super) fn find_face<S: TetComplex>(s: &mut S, [a, b, c]: [u32; 3]) -> SearchResult {
     let Some(t) = find_edge(s, a, b) else {
         return SearchResult::Nothing;
     };
@@ -52,7 +52,7 @@ pub(super) fn find_face<S: Space>(s: &mut S, [a, b, c]: [u32; 3]) -> SearchResul
 }
 
 /// The edges that cross facet `f`, whose own edges all exist; starts in `t`, which it cuts.
-pub(super) fn crossing_edges<S: Space>(
+pub(super) fn crossing_edges<S: TetComplex>(
     s: &mut S,
     f: [u32; 3],
     t: u32,
@@ -90,7 +90,7 @@ pub(super) fn crossing_edges<S: Space>(
     Some(edges)
 }
 
-/// How an attempt to recover one part ended.
+/// Outcome of an attempt to recover one part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
     Recovered,
@@ -99,7 +99,7 @@ pub(super) enum Outcome {
     Touches(u32),
 }
 
-/// Ring searches a segment may cost beyond its share, for each edge it crosses.
+/// Additional ring searches that a segment may cost for each edge it crosses.
 ///
 /// With 10 a disc of 200 corners, cut as a fan, is left to 9,800 points; with 40 surfaces with large flat parts spend
 /// twice as long on flips.
@@ -108,7 +108,7 @@ const WORK_IN_PLANE: u32 = 20;
 /// Neutral steps a target may take, beyond this many per part it crosses.
 const NEUTRAL_MAX: usize = 3;
 
-impl<S: Space> Flipper<'_, S> {
+impl<S: TetComplex> Flipper<'_, S> {
     /// Flips until the edge `a b` exists.
     ///
     /// The number of parts it crosses falls with each step kept, except for a bounded number of neutral ones: in the
@@ -235,7 +235,7 @@ impl<S: Space> Flipper<'_, S> {
         }
     }
 
-    /// Removes the edge `c d` whatever is crossed afterwards, if `good` then says so.
+    /// Removes the edge `c d` without regard to crossings, if `good` accepts the result.
     fn try_neutral(&mut self, t: u32, c: u32, d: u32, good: impl Fn(&mut S) -> bool) -> bool {
         let Some(t) = edge_at(self.s, t, c, d) else {
             return false;

@@ -1,4 +1,4 @@
-//! Flips that make room for a target: 2-3 flips and edge removal, one inside the other.
+//! Flips towards a target: 2-3 flips and edge removal, one inside the other.
 //!
 //! ```text
 //!         d                   Edge removal: the tetrahedra around c d are replaced by the triangles of
@@ -7,11 +7,11 @@
 //!        \|/                  "Minimal triangulations of polygonal domains", 1980) over the exact
 //!         c                   condition that every new tetrahedron is positive.
 //! ```
-//! When no triangulation of a ring is valid, an edge that joins it to `c` or `d` and stands in the way is
-//! removed first, down to a given level; what does not lead to success is undone.
+//! If no triangulation of a ring is valid, an edge that joins it to `c` or `d` and stands in the way is removed first,
+//! down to a given level. Steps without success are undone.
 
+use super::complex::TetComplex;
 use super::polygon::triangulate;
-use super::space::Space;
 use super::target::RecoveryTarget;
 use super::walk::{EdgeRing, edge_at, find_edge, shell};
 use crate::mesh::FaceRef;
@@ -23,7 +23,7 @@ const RING_MAX: usize = 20;
 /// A line that crosses more than this is not worth flipping for.
 pub(super) const CROSSINGS_MAX: usize = 400;
 
-/// One replacement, with what undoing needs.
+/// One replacement, with the data to undo it.
 struct Done {
     old: Vec<u32>,
     quads: Vec<[u32; 4]>,
@@ -31,7 +31,7 @@ struct Done {
 }
 
 /// A surgeon for one target after another.
-pub(super) struct Flipper<'a, S: Space> {
+pub(super) struct Flipper<'a, S: TetComplex> {
     pub s: &'a mut S,
     pub target: RecoveryTarget,
     log: Vec<Done>,
@@ -43,19 +43,19 @@ pub(super) struct Flipper<'a, S: Space> {
     pub flips: u64,
 }
 
-impl<'a, S: Space> Flipper<'a, S> {
-    pub(super) fn new(s: &'a mut S, target: RecoveryTarget) -> Self {
+impl<'a, S: TetComplex> Flipper<'a, S> {
+    pub fn new(s: &'a mut S, target: RecoveryTarget) -> Self {
         Self { s, target, log: Vec::new(), work: 0, crossings_max: CROSSINGS_MAX, flips: 0 }
     }
 
     /// Makes everything done so far final.
-    pub(super) fn keep(&mut self) {
+    pub fn keep(&mut self) {
         self.flips += self.log.len() as u64;
         self.log.clear();
     }
 
     /// A mark for [`Flipper::undo`].
-    pub(super) fn mark(&self) -> usize {
+    pub fn mark(&self) -> usize {
         self.log.len()
     }
 
@@ -65,8 +65,8 @@ impl<'a, S: Space> Flipper<'a, S> {
         self.log.push(Done { old, quads, shapes });
     }
 
-    /// Takes back what was done after `mark`, ids included.
-    pub(super) fn undo(&mut self, mark: usize) {
+    /// Undoes the replacements after `mark`, ids included.
+    pub fn undo(&mut self, mark: usize) {
         while self.log.len() > mark {
             let done = self.log.pop().expect("longer than the mark");
             let back = self.s.replace(&done.shapes, &done.quads);
@@ -75,7 +75,7 @@ impl<'a, S: Space> Flipper<'a, S> {
     }
 
     /// Replaces a face by the edge between its two apexes, where that is valid and allowed.
-    pub(super) fn flip_face(&mut self, face: FaceRef) -> bool {
+    pub fn flip_face(&mut self, face: FaceRef) -> bool {
         let (t, across) = (face.tet(), self.s.across(face.tet(), face.face()));
         let tet = self.s.tet(t);
         if !across.exists() || tet.is_required(face.face()) {
@@ -97,7 +97,7 @@ impl<'a, S: Space> Flipper<'a, S> {
     }
 
     /// Removes the edge `c d` of `t`, with help from edges around it down to `level`.
-    pub(super) fn remove_edge(&mut self, t: u32, c: u32, d: u32, level: u32) -> bool {
+    pub fn remove_edge(&mut self, t: u32, c: u32, d: u32, level: u32) -> bool {
         if self.work == 0 || self.s.protects(c, d) {
             return false;
         }
@@ -170,7 +170,7 @@ impl<'a, S: Space> Flipper<'a, S> {
         found
     }
 
-    /// Whether two corners of the ring, not side by side, can be cut off, as every triangulation of four or more does.
+    /// Returns whether two corners of the ring, not side by side, can be cut off, as every triangulation of four or more does.
     ///
     /// Most rings have none: looking at `n` triangles saves the search over `n` cubed.
     fn has_two_ears(&mut self, ring: &[u32], c: u32, d: u32) -> bool {
@@ -181,7 +181,7 @@ impl<'a, S: Space> Flipper<'a, S> {
             if self.s.orient([x, y, z, d]) > 0.0 && self.s.orient([y, x, z, c]) > 0.0 {
                 ears.push(i);
             }
-            // Of three in a ring of four or more, two are not side by side.
+            // Among three ears in a ring of four or more, two are not adjacent.
             if n == 3 || ears.len() == 3 {
                 break;
             }
@@ -225,7 +225,13 @@ impl<'a, S: Space> Flipper<'a, S> {
 }
 
 /// The worse of the two tetrahedra over a ring triangle: volume over cubed edge; 0 when it may not be.
-fn shape<S: Space>(s: &mut S, target: RecoveryTarget, [x, y, z]: [u32; 3], c: u32, d: u32) -> f64 {
+fn shape<S: TetComplex>(
+    s: &mut S,
+    target: RecoveryTarget,
+    [x, y, z]: [u32; 3],
+    c: u32,
+    d: u32,
+) -> f64 {
     let up = s.orient([x, y, z, d]);
     if up <= 0.0 {
         return 0.0;

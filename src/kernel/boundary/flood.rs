@@ -1,7 +1,8 @@
 //! Components of tetrahedra between required faces.
 //!
-//! A flood from tetrahedron to tetrahedron goes to and fro between pages. So pages are taken one after the other, three times: parts of
-//! components within each; which of them meet parts of other pages; what the tetrahedra of each component are together.
+//! A flood from tetrahedron to tetrahedron would go to and fro between pages. So pages are scanned in order, three
+//! times: for parts of components within each page; for contacts with parts of other pages; for sums over each
+//! component.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +15,7 @@ use tetdb_base::storage::{Pages, kind};
 /// The component that has the enclosing box.
 pub(super) const OUTSIDE: u32 = 1;
 
-/// What is known of one component.
+/// Measures of one component.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Component {
     pub volume: f64,
@@ -28,16 +29,16 @@ pub(super) struct Component {
 /// Components by number; 0 is none, 1 the outside.
 pub(super) struct Flood {
     pub components: Vec<Component>,
-    /// Of each component one of a lower number that is the same volume, or itself.
+    /// For each component one of a lower number that is the same volume, or itself.
     same: Vec<u32>,
 }
 
-/// Pages looked at before what was found in them is written: a megabyte.
+/// Pages scanned before their results are written: a megabyte.
 const BATCH: usize = 64;
 
 impl Flood {
     /// Numbers every tetrahedron's component in its region attribute: the outside, then the others in the order of their first tetrahedra.
-    pub(super) fn run<P: Pages>(mesh: &mut Mesh<P>) -> Self {
+    pub fn run<P: Pages>(mesh: &mut Mesh<P>) -> Self {
         mesh.clear_scratch();
         let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
         let mut n_parts = 0;
@@ -55,17 +56,17 @@ impl Flood {
             }
         }
         for batch in pages.chunks(BATCH) {
-            for [a, b] in scan_parts(mesh, batch, &Meetings).into_iter().flatten() {
-                let (a, b) = (first_of(mesh, a), first_of(mesh, b));
+            for [a, b] in scan_parts(mesh, batch, &AdjacentParts).into_iter().flatten() {
+                let (a, b) = (root_of(mesh, a), root_of(mesh, b));
                 mesh.set_scratch(a.max(b), a.min(b));
             }
         }
         let t = mesh.tet_of(0);
         let part = mesh.tet_attribute(t).0;
         let mut components = vec![Component::default(); 2];
-        let outside = first_of(mesh, part);
+        let outside = root_of(mesh, part);
         for part in 0..n_parts {
-            // What it hangs on comes before it, and has its component's number already.
+            // Its parent comes before it and already has the component's number.
             let on = mesh.scratch(part);
             let component = if part == outside {
                 OUTSIDE
@@ -81,7 +82,7 @@ impl Flood {
             component.side_first = u64::MAX;
         }
         for batch in pages.chunks(BATCH) {
-            for page in scan_parts(mesh, batch, &Sums) {
+            for page in scan_parts(mesh, batch, &SumsByComponent) {
                 for (t, component) in page.tets {
                     let (_, flags) = mesh.tet_attribute(t);
                     mesh.set_tet_attribute(t, component, flags);
@@ -99,7 +100,7 @@ impl Flood {
     }
 
     /// Two components on the sides of a sheet are one volume.
-    pub(super) fn join(&mut self, a: u32, b: u32) {
+    pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.volume(a), self.volume(b));
         let (low, high) = (a.min(b), a.max(b));
         if low == high {
@@ -116,7 +117,7 @@ impl Flood {
     }
 
     /// The component that stands for the volume of component `c`.
-    pub(super) fn volume(&self, mut c: u32) -> u32 {
+    pub fn volume(&self, mut c: u32) -> u32 {
         while self.same[c as usize] != c {
             c = self.same[c as usize];
         }
@@ -124,12 +125,12 @@ impl Flood {
     }
 
     /// The components that stand for a volume, but for the outside.
-    pub(super) fn volumes(&self) -> impl Iterator<Item = u32> {
+    pub fn volumes(&self) -> impl Iterator<Item = u32> {
         (OUTSIDE + 1..self.components.len() as u32).filter(|&c| self.volume(c) == c)
     }
 
     /// Facet `n` bounds component `c`.
-    pub(super) fn touch(&mut self, c: u32, side: u64, label: u32) {
+    pub fn touch(&mut self, c: u32, side: u64, label: u32) {
         let volume = self.volume(c);
         let component = &mut self.components[volume as usize];
         component.facets += 1;
@@ -139,7 +140,7 @@ impl Flood {
 }
 
 /// The first of the parts that hang together with `part`, which from now on hangs on it more directly.
-fn first_of<P: Pages>(mesh: &mut Mesh<P>, mut part: u32) -> u32 {
+fn root_of<P: Pages>(mesh: &mut Mesh<P>, mut part: u32) -> u32 {
     loop {
         let on = mesh.scratch(part);
         if on == part {
@@ -151,7 +152,7 @@ fn first_of<P: Pages>(mesh: &mut Mesh<P>, mut part: u32) -> u32 {
     }
 }
 
-/// Tetrahedra before `t` that lie in its component, for no required face is between.
+/// Tetrahedra before `t` in its component: no required face lies between.
 fn before(t: u32, tet: &Tet) -> impl Iterator<Item = u32> {
     let open = (0..4).filter(|&i| tet.neighbor[i].exists() && !tet.is_required(i));
     let across = open.map(|i| tet.neighbor[i].tet());
@@ -210,9 +211,9 @@ impl Scan for PartsOfPage {
 }
 
 /// Pairs of parts with a face between them that is not required, from the page of the later tetrahedron, once each.
-struct Meetings;
+struct AdjacentParts;
 
-impl Scan for Meetings {
+impl Scan for AdjacentParts {
     type Part = u32;
     type Output = Vec<[u32; 2]>;
 
@@ -233,17 +234,17 @@ impl Scan for Meetings {
     }
 }
 
-/// Components of a page's tetrahedra, and what these are together.
-struct Sums;
+/// Components of a page's tetrahedra, and their sums.
+struct SumsByComponent;
 
 struct PageSums {
     /// Tetrahedron, component.
     tets: Vec<(u32, u32)>,
-    /// Component, volume, tetrahedra, for some that follow each other.
+    /// Component, volume, tetrahedra, for a run of consecutive tetrahedra.
     sums: Vec<(u32, f64, u32)>,
 }
 
-impl Scan for Sums {
+impl Scan for SumsByComponent {
     type Part = u32;
     type Output = PageSums;
 

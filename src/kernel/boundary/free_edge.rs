@@ -1,4 +1,4 @@
-//! The end of a sheet inside a volume, while a vertex on its segment is taken away.
+//! The end of a sheet inside a volume, while a vertex on its segment is removed.
 //!
 //! ```text
 //!        p1--p2             The facet's faces at X make half a turn around its segment a' b'; a vertex in the ball beyond the
@@ -10,16 +10,16 @@
 
 use std::collections::BTreeSet;
 
-use super::chain::Trouble;
-use super::patch::Patch;
-use super::space::{Space, sorted};
+use super::chain::PatchFailure;
+use super::complex::{TetComplex, sorted};
+use super::patch::RecoveryPatch;
 use super::suppress::{CavitySkin, Fan};
 use super::walk::{ball, swapped};
 use crate::mesh::FaceRef;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::Pages;
 
-impl<P: Pages> Patch<'_, P> {
+impl<P: Pages> RecoveryPatch<'_, P> {
     /// Adds the triangle beyond the segment to the skin, as its last facet. Errors: no vertex of the ball is joined to both ends.
     pub(super) fn continue_sheet(
         &mut self,
@@ -27,8 +27,8 @@ impl<P: Pages> Patch<'_, P> {
         x: u32,
         tets: &[u32],
         fan: &Fan,
-    ) -> Result<(), Trouble> {
-        let missing = Trouble::Precision(
+    ) -> Result<(), PatchFailure> {
+        let missing = PatchFailure::Precision(
             "no vertex is joined to both ends of the segment where the sheet ends",
         );
         let (Some(&a), Some(&b)) = (fan.polygon.first(), fan.polygon.last()) else {

@@ -1,6 +1,6 @@
-//! Taking away a vertex that is on no facet.
+//! Removes a vertex that is on no facet.
 
-use super::space::Space;
+use super::complex::TetComplex;
 use super::walk::{ball, swapped};
 use crate::mesh::anatomy::EDGES;
 use tetdb_base::geom::IdSet;
@@ -8,7 +8,7 @@ use tetdb_base::geom::IdSet;
 /// Takes free vertex `x` away if one of its neighbors can stand for it: the best one does.
 ///
 /// No tetrahedron may become flatter than `least`, and none flat.
-pub(super) fn remove_free<S: Space>(s: &mut S, x: u32, least: f64) -> bool {
+pub(super) fn remove_free<S: TetComplex>(s: &mut S, x: u32, least: f64) -> bool {
     let ball = ball(s, x);
     let link: IdSet<u32> =
         ball.iter().flat_map(|&t| s.tet(t).vertices()).filter(|&v| v != x).collect();
@@ -36,8 +36,9 @@ pub(super) fn remove_free<S: Space>(s: &mut S, x: u32, least: f64) -> bool {
 
 /// The ball with `x` moved to its neighbor `u`, if all volumes stay positive.
 ///
-/// `blocking` is a place in the ball and is looked at first: what ruled one neighbor out often rules out the next.
-pub(super) fn moved<S: Space>(
+/// `blocking` is a position in the ball and is tested first: the tetrahedron that ruled one neighbor out often rules
+/// out the next.
+pub(super) fn moved<S: TetComplex>(
     s: &mut S,
     x: u32,
     u: u32,
@@ -67,14 +68,14 @@ pub(super) fn moved<S: Space>(
 }
 
 /// The least flatness of a tetrahedron of `x`.
-pub(super) fn ball_flatness<S: Space>(s: &mut S, x: u32) -> f64 {
+pub(super) fn ball_flatness<S: TetComplex>(s: &mut S, x: u32) -> f64 {
     let quads: Vec<[u32; 4]> = ball(s, x).iter().map(|&t| s.tet(t).vertices()).collect();
     let all = quads.into_iter().map(|q| flatness(s, q));
     all.fold(f64::INFINITY, f64::min)
 }
 
 /// Volume over cubed longest edge.
-fn flatness<S: Space>(s: &mut S, q: [u32; 4]) -> f64 {
+fn flatness<S: TetComplex>(s: &mut S, q: [u32; 4]) -> f64 {
     let volume = s.orient(q);
     let p = q.map(|v| s.position(v));
     let longest = EDGES.iter().map(|&[i, j]| p[i].distance(p[j])).fold(0.0, f64::max);

@@ -1,10 +1,10 @@
 //! A cavity that grows until a given point sees all its outer faces.
 //!
-//! Flat tetrahedra between nearly coplanar input points leave a point no room in doubles. Across a face the point is
-//! behind, the next tetrahedron joins the cavity, until everything is seen: the opposite of shrinking a cavity, and
-//! like it bounded by required faces.
+//! Flat tetrahedra between nearly coplanar input points leave a point no clearance in doubles. If the point is behind a
+//! face, the tetrahedron across that face joins the cavity, until all faces are seen. This is the opposite of shrinking
+//! a cavity, and like it bounded by required faces.
 
-use super::space::{Space, edge_key};
+use super::complex::{TetComplex, edge_key};
 use super::walk::swapped;
 use crate::mesh::anatomy::EDGES;
 use tetdb_base::geom::IdSet;
@@ -13,14 +13,14 @@ use tetdb_base::geom::IdSet;
 const CAVITY_MAX: usize = 300;
 
 /// A cavity and the tetrahedra that join its outer faces to the point.
-pub(super) struct Grown {
+pub(super) struct GrownCavity {
     pub cavity: Vec<u32>,
     pub quads: Vec<[u32; 4]>,
     /// Vertices that no tetrahedron has any more.
     pub lost: Vec<u32>,
 }
 
-/// Why a cavity could not grow.
+/// The obstacle to a growing cavity.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Obstacle {
     /// The point is behind this required face, seen from the cavity.
@@ -28,9 +28,9 @@ pub(super) enum Obstacle {
     Other,
 }
 
-impl Grown {
-    /// The same, where no vertex may be lost.
-    pub(super) fn losing_none(self) -> Result<Self, Obstacle> {
+impl GrownCavity {
+    /// The cavity, unless it would lose a vertex.
+    pub fn without_lost_vertices(self) -> Result<Self, Obstacle> {
         match self.lost.is_empty() {
             true => Ok(self),
             false => Err(Obstacle::Other),
@@ -40,16 +40,16 @@ impl Grown {
 
 /// Grows the cavity `seed` for vertex `x`, which is in no tetrahedron yet.
 ///
-/// Faces with vertex `open` are left to the caller, who will close the cavity there with the triangles `walls`.
-/// Errors: [`Obstacle`], when a required face, a kept edge or one of the `taken` tetrahedra would be swallowed.
-pub(super) fn grow<S: Space>(
+/// Faces with vertex `open` are left to the caller, which closes the cavity there with the triangles `walls`. Errors:
+/// [`Obstacle`], if a required face, a kept edge or one of the `taken` tetrahedra would be swallowed.
+pub(super) fn grow<S: TetComplex>(
     s: &mut S,
     seed: &[u32],
     x: u32,
     open: Option<u32>,
     walls: &[[u32; 3]],
     taken: &IdSet<u32>,
-) -> Result<Grown, Obstacle> {
+) -> Result<GrownCavity, Obstacle> {
     let mut cavity = seed.to_vec();
     let mut inside: IdSet<u32> = seed.iter().copied().collect();
     let mut next = 0;
@@ -81,12 +81,12 @@ pub(super) fn grow<S: Space>(
         }
     }
     let mut quads = Vec::new();
-    let mut rim_edges: IdSet<u64> = IdSet::default();
-    let mut rim: IdSet<u32> = IdSet::default();
+    let mut outline_edges: IdSet<u64> = IdSet::default();
+    let mut outline: IdSet<u32> = IdSet::default();
     let mut note = |face: [u32; 3]| {
-        rim.extend(face);
+        outline.extend(face);
         for k in 0..3 {
-            rim_edges.insert(edge_key(face[k], face[(k + 1) % 3]));
+            outline_edges.insert(edge_key(face[k], face[(k + 1) % 3]));
         }
     };
     walls.iter().for_each(|&w| note(w));
@@ -109,11 +109,11 @@ pub(super) fn grow<S: Space>(
     let mut lost: Vec<u32> = Vec::new();
     for &t in &cavity {
         let v = s.tet(t).vertices();
-        lost.extend(v.into_iter().filter(|&v| !rim.contains(&v) && Some(v) != open));
+        lost.extend(v.into_iter().filter(|&v| !outline.contains(&v) && Some(v) != open));
         for [i, j] in EDGES {
             let (a, b) = (v[i], v[j]);
             let is_lost =
-                Some(a) != open && Some(b) != open && !rim_edges.contains(&edge_key(a, b));
+                Some(a) != open && Some(b) != open && !outline_edges.contains(&edge_key(a, b));
             if is_lost && s.protects(a, b) {
                 return Err(Obstacle::Other);
             }
@@ -125,5 +125,5 @@ pub(super) fn grow<S: Space>(
     }
     lost.sort_unstable();
     lost.dedup();
-    Ok(Grown { cavity, quads, lost })
+    Ok(GrownCavity { cavity, quads, lost })
 }

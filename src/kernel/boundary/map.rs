@@ -1,15 +1,15 @@
-//! Which facets are faces already: those become required, the others are listed.
+//! Marks the facets that are faces already as required, and lists the others.
 
 use std::ops::Range;
 
+use super::complex::{PagedComplex, TetComplex, edge_key, sorted};
 use super::find::{SearchResult, find_face};
-use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::walk::find_edge;
-use crate::mesh::{FaceRef, Facet, Mesh, Scan, scan_parts};
+use crate::mesh::{FaceRef, Mesh, MeshFacet, Scan, scan_parts};
 use tetdb_base::geom::IdSet;
 use tetdb_base::storage::Pages;
 
-/// What the mesh lacks.
+/// Segments and facets that the mesh lacks.
 ///
 /// Held in memory: a few dozen bytes per missing facet. Order: that of the facets.
 #[derive(Debug, Default)]
@@ -35,7 +35,7 @@ impl Scan for FacesOfFacets {
         let none = IdSet::default();
         let face = |n| {
             let f = mesh.facet(n).vertices;
-            match find_face(&mut PagedSpace(mesh, &none), f) {
+            match find_face(&mut PagedComplex(mesh, &none), f) {
                 SearchResult::Face(face) => Some(face),
                 _ => None,
             }
@@ -58,10 +58,10 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
         for (n, face) in (parts[0].start..).zip(found) {
             let mut facet = mesh.facet(n);
             let f = facet.vertices;
-            let mut s = PagedSpace(mesh, &none);
+            let mut s = PagedComplex(mesh, &none);
             if let Some(face) = face {
                 s.require(face);
-                // No region is known yet: the place serves whoever looks for the facet next.
+                // Regions are not set yet: the field stores the face, for the next search of the facet.
                 facet.regions[0] = face.0;
                 mesh.set_facet(n, facet);
                 continue;
@@ -83,7 +83,7 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
 }
 
 /// The face of a facet that [`map`] has found, where flips have left it.
-pub(super) fn face_at<P: Pages>(mesh: &mut Mesh<P>, facet: &Facet) -> Option<FaceRef> {
+pub(super) fn face_at<P: Pages>(mesh: &mut Mesh<P>, facet: &MeshFacet) -> Option<FaceRef> {
     let face = FaceRef(facet.regions[0]);
     let tet = mesh.tet(face.tet());
     let is_there = tet.is_live()

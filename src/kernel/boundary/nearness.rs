@@ -1,18 +1,18 @@
-//! How near triangles come to each other where recovery gave up: what a user has to look at.
+//! The narrowest place between triangles where recovery gave up, for the user.
 
 use std::fmt;
 
-use crate::mesh::{Facet, Mesh};
+use crate::mesh::{Mesh, MeshFacet};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::Pages;
 
-/// Triangles looked at; pairs of more would take long, and the first show what is wrong.
+/// Triangles examined; more pairs would take long, and the first show the cause.
 const LOOKED_AT_MAX: usize = 256;
 
 /// The narrowest place around facets that were not recovered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearness {
-    /// Which distance was measured.
+    /// Kind of the distance.
     pub kind: NearnessKind,
     /// Numbers of the triangles in the input, equal for [`NearnessKind::Height`].
     pub inputs: [u64; 2],
@@ -22,7 +22,7 @@ pub struct Nearness {
     pub value: f64,
 }
 
-/// What is narrow.
+/// Kind of a narrow place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NearnessKind {
     /// The dihedral angle at a shared edge.
@@ -55,13 +55,13 @@ impl fmt::Display for Nearness {
 
 /// The narrowest place among the facets whose boxes meet that of one of `facets`.
 pub(super) fn narrowest<P: Pages>(mesh: &mut Mesh<P>, facets: &[u32]) -> Option<Nearness> {
-    let corners = |mesh: &mut Mesh<P>, f: &Facet| f.vertices.map(|v| mesh.point(v));
+    let corners = |mesh: &mut Mesh<P>, f: &MeshFacet| f.vertices.map(|v| mesh.point(v));
     let mut boxes = Vec::new();
     for &n in facets.iter().take(LOOKED_AT_MAX) {
         let f = mesh.facet(n);
         boxes.push(Aabb::around(corners(mesh, &f)));
     }
-    let mut around: Vec<(Facet, [Point; 3])> = Vec::new();
+    let mut around: Vec<(MeshFacet, [Point; 3])> = Vec::new();
     for n in 0..mesh.n_facets() {
         let f = mesh.facet(n);
         let p = corners(mesh, &f);
@@ -85,7 +85,7 @@ pub(super) fn narrowest<P: Pages>(mesh: &mut Mesh<P>, facets: &[u32]) -> Option<
     narrowest
 }
 
-fn height((f, p): &(Facet, [Point; 3])) -> Nearness {
+fn height((f, p): &(MeshFacet, [Point; 3])) -> Nearness {
     let k = (0..3).max_by(|&i, &j| length(p, i).total_cmp(&length(p, j))).unwrap_or(0);
     let [a, b, c] = [0, 1, 2].map(|i| p[(k + i) % 3]);
     let along = b - a;
@@ -101,8 +101,8 @@ fn length(p: &[Point; 3], i: usize) -> f64 {
     p[i].distance(p[(i + 1) % 3])
 }
 
-/// The angle of two facets with a common edge, else their distance outside what they share.
-fn between((f, p): &(Facet, [Point; 3]), (g, q): &(Facet, [Point; 3])) -> Option<Nearness> {
+/// The angle of two facets with a common edge, else their distance outside shared parts.
+fn between((f, p): &(MeshFacet, [Point; 3]), (g, q): &(MeshFacet, [Point; 3])) -> Option<Nearness> {
     let shared = |v: u32| g.vertices.contains(&v);
     let inputs = [g.input, f.input];
     if f.vertices.iter().filter(|&&v| shared(v)).count() >= 2 {
@@ -124,7 +124,7 @@ fn between((f, p): &(Facet, [Point; 3]), (g, q): &(Facet, [Point; 3])) -> Option
             nearest = Some([x, y]);
         }
     };
-    let side = |f: &Facet, i: usize| [f.vertices[i], f.vertices[(i + 1) % 3]];
+    let side = |f: &MeshFacet, i: usize| [f.vertices[i], f.vertices[(i + 1) % 3]];
     for i in 0..3 {
         if !shared(f.vertices[i]) {
             on_triangle(p[i], q).into_iter().for_each(|y| note(p[i], y));

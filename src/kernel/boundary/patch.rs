@@ -1,10 +1,11 @@
-//! A piece of the mesh in memory, where points may be exact; it grows by what is asked of it.
+//! A part of the mesh in memory, where points may be exact; it grows with the tetrahedra requested.
 //!
-//! The mesh is only read until [`Patch::commit`] writes the result as one step.
+//! The mesh is only read until [`RecoveryPatch::commit`] writes the result as one step.
 
+use super::complex::{TetComplex, edge_key, sorted};
 use super::effort::Effort;
-use super::exact::{ExactPoint, Placed, orient_exact, orient_filtered, orient_in_pairs};
-use super::space::{Space, edge_key, sorted};
+use super::exact::{ExactPoint, PlacedPoint, orient_exact, orient_filtered, orient_in_pairs};
+use crate::mesh::anatomy::REQUIRED;
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use tetdb_base::geom::{Dyadic, IdMap, IdSet, Point, orient};
 use tetdb_base::storage::Pages;
@@ -35,7 +36,7 @@ struct Border {
 }
 
 /// Tetrahedra copied from `mesh`, with ids and vertex ids of their own.
-pub(super) struct Patch<'m, P: Pages> {
+pub(super) struct RecoveryPatch<'m, P: Pages> {
     mesh: &'m mut Mesh<P>,
     protected: &'m IdSet<u64>,
     tets: Vec<Tet>,
@@ -51,15 +52,15 @@ pub(super) struct Patch<'m, P: Pages> {
     required: IdSet<[u32; 3]>,
     /// Edges of the patch that must stay, besides those of `protected`.
     pub kept: IdSet<u64>,
-    /// How hard and in which order to try.
+    /// Limits and order of the attempts.
     pub effort: Effort,
 }
 
 const FREE: Tet = Tet { node: [NONE; 4], neighbor: [FaceRef::NONE; 4] };
 
-impl<'m, P: Pages> Patch<'m, P> {
+impl<'m, P: Pages> RecoveryPatch<'m, P> {
     /// An empty patch.
-    pub(super) fn new(mesh: &'m mut Mesh<P>, protected: &'m IdSet<u64>, effort: Effort) -> Self {
+    pub fn new(mesh: &'m mut Mesh<P>, protected: &'m IdSet<u64>, effort: Effort) -> Self {
         Self {
             mesh,
             protected,
@@ -77,7 +78,7 @@ impl<'m, P: Pages> Patch<'m, P> {
     }
 
     /// Brings in a tetrahedron of mesh vertex `v` and returns the vertex's id here.
-    pub(super) fn vertex(&mut self, v: u32) -> u32 {
+    pub fn vertex(&mut self, v: u32) -> u32 {
         if let Some(&l) = self.local.get(&v) {
             return l;
         }
@@ -93,7 +94,7 @@ impl<'m, P: Pages> Patch<'m, P> {
         for i in 0..4 {
             let v = record.vertex(i);
             let l = self.local_vertex(v, t);
-            tet.node[i] = l | (record.node[i] & crate::mesh::anatomy::REQUIRED);
+            tet.node[i] = l | (record.node[i] & REQUIRED);
             let outside = record.neighbor[i];
             if let Some(k) = self.border_of.remove(&FaceRef::new(id, i).0) {
                 let inside = self.borders[k as usize].inside;
@@ -118,41 +119,38 @@ impl<'m, P: Pages> Patch<'m, P> {
         }
         let point = self.mesh.point(v);
         let steiner = self.mesh.vertex_attribute(v).0 == VertexTag::Steiner;
-        let l = self.vertices.len() as u32;
-        self.vertices.push(PatchVertex {
-            id: v,
-            steiner,
-            point,
-            exact: None,
-            on: [l; 3],
-            tet_of: t,
-        });
+        let l = self.push_vertex(v, steiner, point, None, t);
         self.local.insert(v, l);
         l
     }
 
-    /// Adds a vertex in no tetrahedron.
-    pub(super) fn add_vertex(&mut self, point: Point, exact: Option<ExactPoint>) -> u32 {
+    /// Adds a vertex that lies on no segment or facet.
+    fn push_vertex(
+        &mut self,
+        id: u32,
+        steiner: bool,
+        point: Point,
+        exact: Option<ExactPoint>,
+        tet_of: u32,
+    ) -> u32 {
         let l = self.vertices.len() as u32;
-        self.vertices.push(PatchVertex {
-            id: NONE,
-            steiner: true,
-            point,
-            exact,
-            on: [l; 3],
-            tet_of: NONE,
-        });
+        self.vertices.push(PatchVertex { id, steiner, point, exact, on: [l; 3], tet_of });
         l
     }
 
+    /// Adds a vertex in no tetrahedron.
+    pub fn add_vertex(&mut self, point: Point, exact: Option<ExactPoint>) -> u32 {
+        self.push_vertex(NONE, true, point, exact, NONE)
+    }
+
     /// Adds a vertex in no tetrahedron that is a combination of the vertices `on`, from the input.
-    pub(super) fn add_vertex_on(&mut self, on: [u32; 3], exact: ExactPoint) -> u32 {
+    pub fn add_vertex_on(&mut self, on: [u32; 3], exact: ExactPoint) -> u32 {
         let v = self.add_vertex(exact.rounded(), Some(exact));
         self.vertices[v as usize].on = on;
         v
     }
 
-    /// Whether it is known, without looking at their exact places, that a plane holds the four.
+    /// Returns whether it is known, without looking at their exact places, that a plane holds the four.
     ///
     /// While facets are covered nearly all exact signs are zero for this reason, and would take long to compute.
     fn in_one_plane(&self, v: [u32; 4]) -> bool {
@@ -177,64 +175,64 @@ impl<'m, P: Pages> Patch<'m, P> {
     }
 
     /// Takes a vertex back that was added and is in no tetrahedron.
-    pub(super) fn drop_vertex(&mut self, v: u32) {
+    pub fn drop_vertex(&mut self, v: u32) {
         if v as usize + 1 == self.vertices.len() {
             self.vertices.pop();
         }
     }
 
     /// Number of vertices ever here.
-    pub(super) fn n_vertices(&self) -> u32 {
+    pub fn n_vertices(&self) -> u32 {
         self.vertices.len() as u32
     }
 
-    /// Whether `v` is not from the input.
-    pub(super) fn is_steiner(&self, v: u32) -> bool {
+    /// Returns whether `v` is not from the input.
+    pub fn is_steiner(&self, v: u32) -> bool {
         self.vertices[v as usize].steiner
     }
 
-    /// Whether some tetrahedron has `v`.
-    pub(super) fn is_in_use(&self, v: u32) -> bool {
+    /// Returns whether some tetrahedron has `v`.
+    pub fn is_in_use(&self, v: u32) -> bool {
         let t = self.vertices[v as usize].tet_of;
         t != NONE && self.tets[t as usize].local(v).is_some()
     }
 
-    /// Whether `v` was added here.
-    pub(super) fn is_new(&self, v: u32) -> bool {
+    /// Returns whether `v` was added here.
+    pub fn is_new(&self, v: u32) -> bool {
         self.vertices[v as usize].id == NONE
     }
 
     /// Id of `v` in the mesh, [`NONE`] if it was added here.
-    pub(super) fn mesh_id(&self, v: u32) -> u32 {
+    pub fn mesh_id(&self, v: u32) -> u32 {
         self.vertices[v as usize].id
     }
 
-    /// Whether the position of `v` is more than its rounded one.
-    pub(super) fn is_exact(&self, v: u32) -> bool {
+    /// Returns whether the position of `v` is more than its rounded one.
+    pub fn is_exact(&self, v: u32) -> bool {
         self.vertices[v as usize].exact.is_some()
     }
 
-    /// Where `v` is, without rounding.
-    pub(super) fn exact_place(&self, v: u32) -> ExactPoint {
+    /// Position of `v`, without rounding.
+    pub fn exact_place(&self, v: u32) -> ExactPoint {
         let v = &self.vertices[v as usize];
         let explicit = || ExactPoint::explicit(v.point);
         v.exact.clone().unwrap_or_else(explicit)
     }
 
     /// Position of `v`, rounded, and the exact one if it differs.
-    pub(super) fn placement(&self, v: u32) -> (Point, Option<ExactPoint>) {
+    pub fn placement(&self, v: u32) -> (Point, Option<ExactPoint>) {
         let v = &self.vertices[v as usize];
         (v.point, v.exact.clone())
     }
 
     /// Moves `v`; the caller answers for the volumes around it.
-    pub(super) fn place(&mut self, v: u32, (point, exact): (Point, Option<ExactPoint>)) {
+    pub fn place(&mut self, v: u32, (point, exact): (Point, Option<ExactPoint>)) {
         let v = &mut self.vertices[v as usize];
         (v.point, v.exact) = (point, exact);
     }
 
-    /// From `x` to `v`: the difference of what they are, not of what they round to.
-    pub(super) fn offset(&self, x: u32, v: u32) -> Point {
+    /// From `x` to `v`: the difference of their exact positions.
+    pub fn offset(&self, x: u32, v: u32) -> Point {
         let (from, to) = (&self.vertices[x as usize], &self.vertices[v as usize]);
         if from.exact.is_none() && to.exact.is_none() {
             return to.point - from.point;
@@ -243,22 +241,22 @@ impl<'m, P: Pages> Patch<'m, P> {
     }
 
     /// Position of `v`, rounded.
-    pub(super) fn position_of(&self, v: u32) -> Point {
+    pub fn position_of(&self, v: u32) -> Point {
         self.vertices[v as usize].point
     }
 
-    fn placed(&self, v: u32) -> Placed<'_> {
+    fn placed(&self, v: u32) -> PlacedPoint<'_> {
         let v = &self.vertices[v as usize];
-        Placed { point: v.point, exact: v.exact.as_ref() }
+        PlacedPoint { point: v.point, exact: v.exact.as_ref() }
     }
 
     /// Six times the signed volume, without rounding.
-    pub(super) fn orient_exact(&self, v: [u32; 4]) -> Dyadic {
+    pub fn orient_exact(&self, v: [u32; 4]) -> Dyadic {
         orient_exact(v.map(|v| self.placed(v)))
     }
 
     /// Tetrahedron `t` as it is.
-    pub(super) fn tet_now(&self, t: u32) -> Tet {
+    pub fn tet_now(&self, t: u32) -> Tet {
         self.tets[t as usize]
     }
 
@@ -267,8 +265,8 @@ impl<'m, P: Pages> Patch<'m, P> {
         (0..self.tets.len() as u32).filter(|&t| self.tets[t as usize].is_live())
     }
 
-    /// Whether the patch may be written: no exact point is in use, and all volumes are positive as rounded.
-    pub(super) fn is_sound(&self) -> bool {
+    /// Returns whether the patch may be written: no exact point is in use, and all volumes are positive as rounded.
+    pub fn is_sound(&self) -> bool {
         self.live().all(|t| {
             let v = self.tets[t as usize].vertices().map(|v| &self.vertices[v as usize]);
             v.iter().all(|v| v.exact.is_none())
@@ -276,8 +274,8 @@ impl<'m, P: Pages> Patch<'m, P> {
         })
     }
 
-    /// Whether every required face brought in is still there and required.
-    pub(super) fn keeps_required(&self) -> bool {
+    /// Returns whether every required face brought in is still there and required.
+    pub fn keeps_required(&self) -> bool {
         let mut now: IdSet<[u32; 3]> = IdSet::default();
         for t in self.live() {
             let tet = &self.tets[t as usize];
@@ -287,10 +285,10 @@ impl<'m, P: Pages> Patch<'m, P> {
         self.required.is_subset(&now)
     }
 
-    /// Writes the patch in place of what was brought in; returns the number of vertices added less those removed.
+    /// Writes the patch in place of the loaded tetrahedra; returns the number of vertices added less those removed.
     ///
-    /// Must be [`Patch::is_sound`]. Effects: new vertices are tagged as Steiner points.
-    pub(super) fn commit(self) -> i64 {
+    /// Must be [`RecoveryPatch::is_sound`]. Effects: new vertices are tagged as Steiner points.
+    pub fn commit(self) -> i64 {
         let live: Vec<u32> = self.live().collect();
         let mut used = vec![false; self.vertices.len()];
         for &t in &live {
@@ -322,7 +320,7 @@ impl<'m, P: Pages> Patch<'m, P> {
             let id = tet_id[t as usize];
             for i in 0..4 {
                 let v = vertex_id[tet.vertex(i) as usize];
-                tet.node[i] = v | (tet.node[i] & crate::mesh::anatomy::REQUIRED);
+                tet.node[i] = v | (tet.node[i] & REQUIRED);
                 let n = tet.neighbor[i];
                 if n.exists() && n.0 & BORDER != 0 {
                     let outside = self.borders[(n.0 & !BORDER) as usize].outside;
@@ -346,7 +344,7 @@ impl<'m, P: Pages> Patch<'m, P> {
     }
 }
 
-impl<P: Pages> Space for Patch<'_, P> {
+impl<P: Pages> TetComplex for RecoveryPatch<'_, P> {
     fn tet(&mut self, t: u32) -> Tet {
         self.tets[t as usize]
     }

@@ -1,14 +1,14 @@
 //! The exact path: patches around facets that flips cannot recover.
 
-use super::chain::Trouble;
+use super::chain::PatchFailure;
+use super::complex::{PagedComplex, TetComplex, edge_key, sorted};
 use super::effort::{EFFORTS, Effort};
 use super::find::{SearchResult, find_face};
-use super::flat::{FlatPart, flat_parts, single_parts};
+use super::flat_parts::{FlatPart, flat_parts, single_parts};
 use super::free_vertex::remove_free;
 use super::map::MissingFacets;
-use super::patch::Patch;
+use super::patch::RecoveryPatch;
 use super::report::{RecoveryReport, RecoveryWatcher};
-use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::suppress::CavitySkin;
 use super::turn::{from_hubs, turn_segment};
 use super::walk::{find_edge, shell};
@@ -29,22 +29,22 @@ pub(super) fn recover_by_points<P: Pages>(
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
     watch: &RecoveryWatcher,
-) -> Vec<(u32, Trouble)> {
-    let mut troubles = Vec::new();
+) -> Vec<(u32, PatchFailure)> {
+    let mut failures = Vec::new();
     for _ in 0..ROUNDS_MAX {
         let before = missing.facets.len();
-        troubles.clear();
+        failures.clear();
         let mut left = Vec::new();
         for group in groups(mesh, &missing.facets, &mut missing.protected) {
             check_cancelled();
             report.notify(watch);
             report.patches += 1;
-            let Err((facets, trouble)) = recover_group(mesh, missing, &group, report) else {
+            let Err((facets, failure)) = recover_group(mesh, missing, &group, report) else {
                 report.facets_by_points += group.len() as u32;
                 continue;
             };
             report.facets_by_points += (group.len() - facets.len()) as u32;
-            troubles.extend(facets.iter().map(|&n| (n, trouble)));
+            failures.extend(facets.iter().map(|&n| (n, failure)));
             left.extend(facets);
         }
         missing.facets = left;
@@ -52,7 +52,7 @@ pub(super) fn recover_by_points<P: Pages>(
             break;
         }
     }
-    troubles
+    failures
 }
 
 /// Recovers the facets of `group`, those in one plane as one part if possible; returns those left and why.
@@ -61,13 +61,13 @@ fn recover_group<P: Pages>(
     missing: &mut MissingFacets,
     group: &[u32],
     report: &mut RecoveryReport,
-) -> Result<(), (Vec<u32>, Trouble)> {
+) -> Result<(), (Vec<u32>, PatchFailure)> {
     // A triangle given twice is one face.
     let mut seen = IdSet::default();
     let corners: Vec<[u32; 3]> = group.iter().map(|&n| mesh.facet(n).vertices).collect();
     let mut once = corners.clone();
     once.retain(|&f| seen.insert(sorted(f)));
-    let parts = flat_parts(&mut PagedSpace(mesh, &missing.protected), &once);
+    let parts = flat_parts(&mut PagedComplex(mesh, &missing.protected), &once);
     let mut left = group.to_vec();
     if parts.len() < once.len() && attempt(mesh, missing, &parts, report).is_ok() {
         turn_inside(mesh, missing, &parts, report);
@@ -77,8 +77,8 @@ fn recover_group<P: Pages>(
     }
     if !left.is_empty() {
         let parts = single_parts(&once);
-        if let Err(trouble) = attempt(mesh, missing, &parts, report) {
-            return Err((left, trouble));
+        if let Err(failure) = attempt(mesh, missing, &parts, report) {
+            return Err((left, failure));
         }
     }
     for n in left {
@@ -91,7 +91,7 @@ fn recover_group<P: Pages>(
 fn require_facet<P: Pages>(mesh: &mut Mesh<P>, n: u32) -> bool {
     let f = mesh.facet(n).vertices;
     let none = IdSet::default();
-    let mut s = PagedSpace(mesh, &none);
+    let mut s = PagedComplex(mesh, &none);
     match find_face(&mut s, f) {
         SearchResult::Face(face) => {
             s.require(face);
@@ -109,8 +109,8 @@ fn turn_inside<P: Pages>(
     report: &mut RecoveryReport,
 ) {
     for part in parts {
-        let rim = part.rim.iter().map(|&(a, b)| edge_key(a, b));
-        missing.protected.extend(rim);
+        let outline = part.outline.iter().map(|&(a, b)| edge_key(a, b));
+        missing.protected.extend(outline);
     }
     for part in parts {
         for (a, b) in from_hubs(&part.inner) {
@@ -138,7 +138,7 @@ fn groups<P: Pages>(
     for (i, &n) in facets.iter().enumerate() {
         let [a, b, c] = mesh.facet(n).vertices;
         for (p, q) in [(a, b), (b, c), (c, a)] {
-            if find_edge(&mut PagedSpace(mesh, &none), p, q).is_some() {
+            if find_edge(&mut PagedComplex(mesh, &none), p, q).is_some() {
                 protected.insert(edge_key(p, q));
                 continue;
             }
@@ -157,17 +157,17 @@ fn groups<P: Pages>(
 
 /// Tries one effort after the other until the parts are sets of faces.
 ///
-/// Of a part of several facets the faces are not required: they are not yet those of the surface.
+/// Faces of a part with several facets are not required: they are not yet those of the surface.
 fn attempt<P: Pages>(
     mesh: &mut Mesh<P>,
     missing: &MissingFacets,
     parts: &[FlatPart],
     report: &mut RecoveryReport,
-) -> Result<(), Trouble> {
-    let mut outcome = Err(Trouble::TooMuch);
+) -> Result<(), PatchFailure> {
+    let mut outcome = Err(PatchFailure::TooMuch);
     for effort in EFFORTS {
         outcome = try_parts(mesh, &missing.protected, parts, effort, report);
-        if matches!(outcome, Ok(()) | Err(Trouble::Vertex(_))) {
+        if matches!(outcome, Ok(()) | Err(PatchFailure::Vertex(_))) {
             break;
         }
     }
@@ -180,8 +180,8 @@ fn try_parts<P: Pages>(
     parts: &[FlatPart],
     effort: Effort,
     report: &mut RecoveryReport,
-) -> Result<(), Trouble> {
-    let mut patch = Patch::new(mesh, protected, effort);
+) -> Result<(), PatchFailure> {
+    let mut patch = RecoveryPatch::new(mesh, protected, effort);
     let mut local: Vec<FlatPart> = parts.iter().map(|p| p.renamed(|v| patch.vertex(v))).collect();
     if effort.reversed {
         local.reverse();
@@ -189,14 +189,14 @@ fn try_parts<P: Pages>(
     let mut skin =
         CavitySkin { facets: local.iter().map(|p| p.facets[0]).collect(), ..CavitySkin::default() };
     let outcome = build(&mut patch, &mut skin, &local);
-    let named = |trouble| match trouble {
-        Trouble::Vertex(v) => Trouble::Vertex(patch.mesh_id(v)),
-        Trouble::Crossed(f) => Trouble::Crossed(f.map(|v| patch.mesh_id(v))),
+    let named = |failure| match failure {
+        PatchFailure::Vertex(v) => PatchFailure::Vertex(patch.mesh_id(v)),
+        PatchFailure::Crossed(f) => PatchFailure::Crossed(f.map(|v| patch.mesh_id(v))),
         other => other,
     };
     let points = outcome.map_err(named)?;
     if !patch.is_sound() {
-        return Err(Trouble::Precision("doubles leave no volume beside it"));
+        return Err(PatchFailure::Precision("doubles leave no volume beside it"));
     }
     let n_facets: usize = local.iter().map(|p| p.facets.len()).sum();
     let is_whole =
@@ -208,7 +208,7 @@ fn try_parts<P: Pages>(
         || !adds_none
         || !patch.keeps_required()
     {
-        return Err(Trouble::Broken("a facet is not whole"));
+        return Err(PatchFailure::Broken("a facet is not whole"));
     }
     report.points_on_surface += points;
     let free: Vec<[u32; 3]> = skin
@@ -220,7 +220,7 @@ fn try_parts<P: Pages>(
     let added = patch.commit();
     report.steiner = report.steiner.saturating_add_signed(added as i32);
     let none = IdSet::default();
-    let mut s = PagedSpace(mesh, &none);
+    let mut s = PagedComplex(mesh, &none);
     for face in free {
         match find_face(&mut s, face) {
             SearchResult::Face(face) => s.release(face),
@@ -230,20 +230,20 @@ fn try_parts<P: Pages>(
     Ok(())
 }
 
-/// Whether none of the vertices has left the surface or, of many, less than one in [`FEW`].
+/// Returns whether none of the vertices has left the surface or, of many, less than one in [`FEW`].
 fn is_slow(before: usize, after: usize) -> bool {
     before == after || before > MANY && (before - after) * FEW < before
 }
 
 /// Chains, faces, suppression; returns how many vertices were on the surface for a while.
 fn build<P: Pages>(
-    patch: &mut Patch<'_, P>,
+    patch: &mut RecoveryPatch<'_, P>,
     skin: &mut CavitySkin,
     parts: &[FlatPart],
-) -> Result<u32, Trouble> {
+) -> Result<u32, PatchFailure> {
     let mut chains: IdMap<(u32, u32), Vec<u32>> = IdMap::default();
     let mut on_segments: Vec<u32> = Vec::new();
-    for &(a, b) in parts.iter().flat_map(|p| &p.rim) {
+    for &(a, b) in parts.iter().flat_map(|p| &p.outline) {
         if chains.contains_key(&(a, b)) {
             continue;
         }
@@ -261,18 +261,18 @@ fn build<P: Pages>(
     let mut points = on_segments.len() as u32;
     let mut late: Vec<u32> = Vec::new();
     for (k, part) in parts.iter().enumerate() {
-        let rim: Vec<(u32, u32)> = part
-            .rim
+        let outline: Vec<(u32, u32)> = part
+            .outline
             .iter()
             .flat_map(|side| chains[side].windows(2).map(|edge| (edge[0], edge[1])))
             .collect();
-        let faces = patch.cover(part, &rim)?;
-        let on_rim: IdSet<u32> = rim.iter().map(|edge| edge.0).collect();
+        let faces = patch.cover(part, &outline)?;
+        let on_outline: IdSet<u32> = outline.iter().map(|edge| edge.0).collect();
         let mut inside: Vec<u32> = faces
             .iter()
             .flatten()
             .copied()
-            .filter(|v| !on_rim.contains(v) && !part.has(*v))
+            .filter(|v| !on_outline.contains(v) && !part.has(*v))
             .collect();
         inside.sort_unstable();
         inside.dedup();
@@ -281,21 +281,22 @@ fn build<P: Pages>(
         }
         for &face in &faces {
             let [p, q, r] = face;
-            let t = find_edge(patch, p, q).ok_or(Trouble::Broken("a face was lost"))?;
-            let around = shell(patch, t, p, q).ok_or(Trouble::Broken("a facet on the hull"))?;
+            let t = find_edge(patch, p, q).ok_or(PatchFailure::Broken("a face was lost"))?;
+            let around =
+                shell(patch, t, p, q).ok_or(PatchFailure::Broken("a facet on the hull"))?;
             let i = around
                 .ring
                 .iter()
                 .position(|&v| v == r)
-                .ok_or(Trouble::Broken("a face was lost"))?;
-            // tets[i] has p, q, r and the next of the ring: the face is opposite that one.
+                .ok_or(PatchFailure::Broken("a face was lost"))?;
+            // tets[i] has p, q, r and the next vertex of the ring: the face is opposite that vertex.
             let t = around.tets[i];
             let next = around.ring[(i + 1) % around.ring.len()];
             let l = patch.tet(t).local(next).expect("a vertex of the shell");
             patch.require(FaceRef::new(t, l));
         }
         points += inside.len() as u32;
-        // What has no room now may have some when others are gone.
+        // A vertex without clearance now may have some after others are gone.
         for v in inside {
             if patch.suppress(skin, v).is_err() {
                 late.push(v);
@@ -308,22 +309,23 @@ fn build<P: Pages>(
     }
     while !late.is_empty() {
         let before = late.len();
-        let mut trouble = None;
+        let mut failure = None;
         let mut left = Vec::new();
         for v in late {
             if let Err(why) = patch.suppress(skin, v) {
-                trouble = Some(why);
+                failure = Some(why);
                 left.push(v);
             }
         }
         late = left;
-        match trouble {
-            // Mostly a few of thousands have no room: they alone go where no double is, all else is as good as it was. Each try in vain takes
-            // milliseconds, and when one finds room now and then, hundreds of others are tried again.
+        match failure {
+            // Usually a few of thousands have no clearance. They alone go to exact places; all others are already fine.
+            // A failed try takes milliseconds, and if one vertex succeeds now and then, hundreds of others are tried
+            // again.
             Some(_) if is_slow(before, late.len()) && !patch.effort.exact => {
                 patch.effort.exact = true;
             }
-            Some(trouble) if late.len() == before => return Err(trouble),
+            Some(failure) if late.len() == before => return Err(failure),
             _ => {}
         }
     }
@@ -333,7 +335,7 @@ fn build<P: Pages>(
         }
     }
     if patch.effort.exact {
-        patch.settle()?;
+        patch.round_to_doubles()?;
     }
     Ok(points)
 }

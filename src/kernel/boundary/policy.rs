@@ -1,4 +1,4 @@
-//! Which volumes are filled, from how they meet.
+//! Policies that choose filled volumes by the walls between them.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -6,7 +6,7 @@ use super::error::BoundaryError;
 use tetdb_base::surface::Wall;
 use tetdb_schema::word::Word;
 
-/// How pairs of volumes meet, the lower-numbered one first.
+/// Walls between pairs of volumes, the lower-numbered one first.
 pub type Walls = BTreeMap<(u32, u32), Wall>;
 
 /// Which regions that the surface encloses are filled with tetrahedra.
@@ -40,7 +40,7 @@ impl Word for RegionPolicy {
 pub struct Filled {
     /// Numbers of the chosen volumes.
     pub volumes: BTreeSet<u32>,
-    /// What some of them are called.
+    /// Names of chosen volumes, if they have one.
     pub names: BTreeMap<u32, String>,
     /// Parity was contradictory (shared walls), so all were chosen.
     pub all_instead_of_parity: bool,

@@ -1,11 +1,11 @@
-//! Triangulation of a polygon by dynamic programming: the best worst triangle.
+//! Triangulates a polygon by dynamic programming, so that the worst triangle is best.
 //!
 //! Source: G. T. Klincsek, "Minimal triangulations of polygonal domains", Annals of Discrete Mathematics 9 (1980).
 
 /// Triangles `[i, k, j]`, `i < k < j`, of the polygon `0..n`, so that the least value is greatest.
 ///
-/// `value` is asked once per triangle that may matter; `<= 0` forbids it. `chord` is asked for the inner
-/// edges `i < j` that could be used. `None` when nothing is allowed.
+/// `value` is called once per triangle that may matter; `<= 0` forbids it. `chord` is called for the inner edges `i <
+/// j` that could be used. `None` if nothing is allowed.
 pub(super) fn triangulate(
     n: usize,
     mut chord: impl FnMut(usize, usize) -> bool,

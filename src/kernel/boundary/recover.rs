@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use super::chain::Trouble;
+use super::chain::PatchFailure;
+use super::complex::{PagedComplex, TetComplex, edge_key};
 use super::error::{BoundaryError, FacetPlace};
 use super::find::{Outcome, SearchResult, find_face};
 use super::flips::{CROSSINGS_MAX, Flipper};
@@ -10,14 +11,13 @@ use super::map::{MissingFacets, map};
 use super::nearness::narrowest;
 use super::points::recover_by_points;
 use super::report::{RecoveryReport, RecoveryWatcher};
-use super::space::{PagedSpace, Space, edge_key};
 use super::target::RecoveryTarget;
 use super::tidy::tidy;
 use super::turn::{from_hubs, turn_segment};
 use crate::mesh::Mesh;
 use tetdb_base::storage::{Pages, check_cancelled};
 
-/// How deep edge removals may nest, pass after pass, and the ring searches a target may cost then.
+/// Nesting depth of edge removals in each pass, and the number of ring searches per target.
 const LEVELS: [(u32, u32); 3] = [(0, 40), (1, 80), (2, 160)];
 
 /// Parts a segment may cross to be flipped for before edges are turned. Flips cost the square of this: where a fan of slats lies across
@@ -31,11 +31,11 @@ const CROSSINGS_FIRST: usize = 8;
 ///
 /// Errors: [`BoundaryError`] names the facets; the mesh is then valid but without them.
 pub fn recover<P: Pages>(mesh: &mut Mesh<P>) -> Result<RecoveryReport, BoundaryError> {
-    recover_watched(mesh, &|_, _| {})
+    recover_with_progress(mesh, &|_, _| {})
 }
 
 /// As [`recover`]; `watch` gets the segments and facets that are there, of those that were missing.
-pub fn recover_watched<P: Pages>(
+pub fn recover_with_progress<P: Pages>(
     mesh: &mut Mesh<P>,
     watch: &RecoveryWatcher,
 ) -> Result<RecoveryReport, BoundaryError> {
@@ -55,35 +55,35 @@ pub fn recover_watched<P: Pages>(
     flip_facets(mesh, &mut missing, &mut report, watch);
     report.flip_time = clock.elapsed();
     let clock = Instant::now();
-    let troubles = recover_by_points(mesh, &mut missing, &mut report, watch);
+    let failures = recover_by_points(mesh, &mut missing, &mut report, watch);
     tidy(mesh, &mut report);
     report.point_time = clock.elapsed();
-    match troubles.first() {
+    match failures.first() {
         None => Ok(report),
-        Some(&(n, trouble)) => Err(explain(mesh, n, trouble, &troubles)),
+        Some(&(n, failure)) => Err(explain(mesh, n, failure, &failures)),
     }
 }
 
 fn explain<P: Pages>(
     mesh: &mut Mesh<P>,
     n: u32,
-    trouble: Trouble,
-    troubles: &[(u32, Trouble)],
+    failure: PatchFailure,
+    failures: &[(u32, PatchFailure)],
 ) -> BoundaryError {
-    let reason = match trouble {
-        Trouble::Vertex(v) => {
+    let reason = match failure {
+        PatchFailure::Vertex(v) => {
             return BoundaryError::VertexOnFacet {
                 owner: mesh.vertex_attribute(v).1,
                 point: mesh.point(v),
                 facet: Box::new(place(mesh, n)),
             };
         }
-        Trouble::Crossed(_) => "another triangle crosses it",
-        Trouble::Precision(what) => what,
-        Trouble::TooMuch => "it crosses too many edges",
-        Trouble::Broken(what) => what,
+        PatchFailure::Crossed(_) => "another triangle crosses it",
+        PatchFailure::Precision(what) => what,
+        PatchFailure::TooMuch => "it crosses too many edges",
+        PatchFailure::Broken(what) => what,
     };
-    let facets: Vec<u32> = troubles.iter().map(|&(n, _)| n).collect();
+    let facets: Vec<u32> = failures.iter().map(|&(n, _)| n).collect();
     BoundaryError::NotRecovered {
         nearness: narrowest(mesh, &facets),
         facets: facets.into_iter().map(|n| place(mesh, n)).collect(),
@@ -117,35 +117,28 @@ fn turn_segments<P: Pages>(
     missing.segments = left;
 }
 
-fn flip_segments<P: Pages>(
+/// Tries to recover missing parts by flips, level by level, while that recovers enough of them.
+///
+/// `parts` selects the list of missing parts; `recover` tries one with a level and a limit of ring searches.
+fn flip_missing<P: Pages, T: Copy>(
     mesh: &mut Mesh<P>,
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
-    crossings_max: usize,
     watch: &RecoveryWatcher,
+    parts: impl Fn(&mut MissingFacets) -> &mut Vec<T>,
+    recover: impl Fn(&mut Mesh<P>, &mut MissingFacets, &mut RecoveryReport, T, (u32, u32)) -> bool,
 ) {
-    for (level, work) in LEVELS {
+    for level in LEVELS {
         loop {
-            let before = missing.segments.len();
-            let mut left = Vec::new();
-            for (a, b) in std::mem::take(&mut missing.segments) {
+            let mut left = std::mem::take(parts(missing));
+            let before = left.len();
+            left.retain(|&part| {
                 check_cancelled();
                 report.notify(watch);
-                let mut s = PagedSpace(mesh, &missing.protected);
-                let mut flipper = Flipper::new(&mut s, RecoveryTarget::Edge(a, b));
-                flipper.work = work;
-                flipper.crossings_max = crossings_max;
-                let outcome = flipper.recover_edge(a, b, level);
-                report.flips += flipper.flips;
-                if outcome == Outcome::Recovered {
-                    report.segments_by_flips += 1;
-                    missing.protected.insert(edge_key(a, b));
-                } else {
-                    left.push((a, b));
-                }
-            }
-            missing.segments = left;
-            let after = missing.segments.len();
+                !recover(mesh, missing, report, part, level)
+            });
+            let after = left.len();
+            *parts(missing) = left;
             if after == 0 {
                 return;
             }
@@ -156,41 +149,58 @@ fn flip_segments<P: Pages>(
     }
 }
 
+fn flip_segments<P: Pages>(
+    mesh: &mut Mesh<P>,
+    missing: &mut MissingFacets,
+    report: &mut RecoveryReport,
+    crossings_max: usize,
+    watch: &RecoveryWatcher,
+) {
+    let recover = |mesh: &mut Mesh<P>,
+                   missing: &mut MissingFacets,
+                   report: &mut RecoveryReport,
+                   (a, b): (u32, u32),
+                   (level, work)| {
+        let mut s = PagedComplex(mesh, &missing.protected);
+        let mut flipper = Flipper::new(&mut s, RecoveryTarget::Edge(a, b));
+        flipper.work = work;
+        flipper.crossings_max = crossings_max;
+        let is_recovered = flipper.recover_edge(a, b, level) == Outcome::Recovered;
+        report.flips += flipper.flips;
+        if is_recovered {
+            report.segments_by_flips += 1;
+            missing.protected.insert(edge_key(a, b));
+        }
+        is_recovered
+    };
+    flip_missing(mesh, missing, report, watch, |missing| &mut missing.segments, recover);
+}
+
 fn flip_facets<P: Pages>(
     mesh: &mut Mesh<P>,
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
     watch: &RecoveryWatcher,
 ) {
-    for (level, work) in LEVELS {
-        loop {
-            let before = missing.facets.len();
-            let mut left = Vec::new();
-            for n in std::mem::take(&mut missing.facets) {
-                check_cancelled();
-                report.notify(watch);
-                let f = mesh.facet(n).vertices;
-                let mut s = PagedSpace(mesh, &missing.protected);
-                let mut flipper = Flipper::new(&mut s, RecoveryTarget::Face(f));
-                flipper.work = work;
-                let outcome = flipper.recover_face(f, level);
-                report.flips += flipper.flips;
-                match find_face(&mut s, f) {
-                    SearchResult::Face(face) if outcome == Outcome::Recovered => {
-                        s.require(face);
-                        report.facets_by_flips += 1;
-                    }
-                    _ => left.push(n),
-                }
+    let recover = |mesh: &mut Mesh<P>,
+                   missing: &mut MissingFacets,
+                   report: &mut RecoveryReport,
+                   n: u32,
+                   (level, work)| {
+        let f = mesh.facet(n).vertices;
+        let mut s = PagedComplex(mesh, &missing.protected);
+        let mut flipper = Flipper::new(&mut s, RecoveryTarget::Face(f));
+        flipper.work = work;
+        let outcome = flipper.recover_face(f, level);
+        report.flips += flipper.flips;
+        match find_face(&mut s, f) {
+            SearchResult::Face(face) if outcome == Outcome::Recovered => {
+                s.require(face);
+                report.facets_by_flips += 1;
+                true
             }
-            missing.facets = left;
-            let after = missing.facets.len();
-            if after == 0 {
-                return;
-            }
-            if after + after / 16 >= before {
-                break;
-            }
+            _ => false,
         }
-    }
+    };
+    flip_missing(mesh, missing, report, watch, |missing| &mut missing.facets, recover);
 }

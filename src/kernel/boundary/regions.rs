@@ -1,7 +1,8 @@
-//! Which volumes are filled: components between required faces, those kept that the policy chooses.
+//! Fills the volumes that the policy chooses among the components between required faces.
 
 use std::collections::BTreeMap;
 
+use super::complex::PagedComplex;
 use super::error::BoundaryError;
 use super::find::{SearchResult, find_face};
 use super::flood::{Flood, OUTSIDE};
@@ -9,7 +10,6 @@ use super::map::face_at;
 use super::policy::{Filled, Walls};
 use super::recover::place;
 use super::seeds::RegionRule;
-use super::space::PagedSpace;
 use crate::delaunay::Kernel;
 use crate::mesh::{Mesh, SHEET, VertexTag};
 use tetdb_base::storage::{Pages, check_cancelled};
@@ -20,7 +20,7 @@ use tetdb_schema::page::NONE;
 pub struct RegionSummary {
     /// Number of the region, from 1; 0 for one that stays empty.
     pub region: u32,
-    /// What it is called.
+    /// Name of the region, if it has one.
     pub name: Option<String>,
     /// In cubed input units.
     pub volume: f64,
@@ -34,7 +34,7 @@ pub struct RegionSummary {
 
 /// The bounded volumes of a surface.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Regions {
+pub struct VolumeRegions {
     /// Ordered by the smallest facet around each, the one in front of it first.
     pub list: Vec<RegionSummary>,
     /// Parity was contradictory (shared walls), so all were filled.
@@ -43,7 +43,7 @@ pub struct Regions {
     pub loose_facets: Vec<u64>,
 }
 
-impl Regions {
+impl VolumeRegions {
     /// Names of region 1, 2, …, empty for one without; none at all when no region has one.
     pub fn names(&self) -> Vec<String> {
         let filled = self.list.iter().filter(|region| region.region > 0);
@@ -66,10 +66,10 @@ impl Regions {
 pub fn fill_regions<P: Pages>(
     mesh: &mut Mesh<P>,
     rule: &RegionRule,
-) -> Result<Regions, BoundaryError> {
+) -> Result<VolumeRegions, BoundaryError> {
     let mut flood = Flood::run(mesh);
-    let walls = survey(mesh, &mut flood)?;
-    let mut regions = Regions::default();
+    let walls = note_components(mesh, &mut flood)?;
+    let mut regions = VolumeRegions::default();
     let filled = choose(mesh, &flood, &walls, rule)?;
     regions.all_instead_of_parity = filled.all_instead_of_parity;
     let mut order: Vec<u32> = flood.volumes().collect();
@@ -99,7 +99,10 @@ pub fn fill_regions<P: Pages>(
 }
 
 /// Notes on both sides of every facet which component lies there.
-fn survey<P: Pages>(mesh: &mut Mesh<P>, flood: &mut Flood) -> Result<Walls, BoundaryError> {
+fn note_components<P: Pages>(
+    mesh: &mut Mesh<P>,
+    flood: &mut Flood,
+) -> Result<Walls, BoundaryError> {
     let mut walls: Walls = BTreeMap::new();
     let none = tetdb_base::geom::IdSet::default();
     for n in 0..mesh.n_facets() {
@@ -108,7 +111,7 @@ fn survey<P: Pages>(mesh: &mut Mesh<P>, flood: &mut Flood) -> Result<Walls, Boun
         }
         let mut facet = mesh.facet(n);
         let known = face_at(mesh, &facet).map(SearchResult::Face);
-        let found = || find_face(&mut PagedSpace(mesh, &none), facet.vertices);
+        let found = || find_face(&mut PagedComplex(mesh, &none), facet.vertices);
         let SearchResult::Face(face) = known.unwrap_or_else(found) else {
             return Err(BoundaryError::NotRecovered {
                 facets: vec![place(mesh, n)],
@@ -182,8 +185,8 @@ fn choose<P: Pages>(
     })
 }
 
-/// Deletes what is not filled and writes the numbers of what is.
-fn apply<P: Pages>(mesh: &mut Mesh<P>, number: &[u32], regions: &mut Regions) {
+/// Deletes unfilled components and writes the region numbers of the others.
+fn apply<P: Pages>(mesh: &mut Mesh<P>, number: &[u32], regions: &mut VolumeRegions) {
     use crate::mesh::FaceRef;
     let mut from = 0;
     while let Some((t, tet)) = mesh.next_tet(from) {

@@ -3,7 +3,7 @@ use std::time::Duration;
 /// Gets how much is done and how much there is to do.
 pub type RecoveryWatcher<'a> = dyn Fn(u64, u64) + 'a;
 
-/// What recovery found and did.
+/// Counts and times of a recovery.
 #[derive(Clone, Debug, Default)]
 pub struct RecoveryReport {
     /// Facets of the input.
@@ -26,7 +26,7 @@ pub struct RecoveryReport {
     pub steiner: u32,
     /// Flips done.
     pub flips: u64,
-    /// Time to find what is missing.
+    /// Time to find missing segments and facets.
     pub map_time: Duration,
     /// Time to recover by flips.
     pub flip_time: Duration,
@@ -35,7 +35,8 @@ pub struct RecoveryReport {
 }
 
 impl RecoveryReport {
-    /// Tells how much is there of what was missing. A segment that comes with the facets around it is never counted.
+    /// Reports progress: the number recovered, of those that were missing. A segment that comes with the facets around
+    /// it is never counted.
     pub(super) fn notify(&self, watch: &RecoveryWatcher) {
         let done = self.segments_by_flips + self.facets_by_flips + self.facets_by_points;
         let total = self.missing_segments + self.missing_facets;

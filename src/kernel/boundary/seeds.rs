@@ -1,4 +1,4 @@
-//! What seeds say of volumes: which are filled, which stay empty, what they are called.
+//! Seeds of volumes: filled volumes, holes, names.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,8 +26,8 @@ impl From<RegionPolicy> for RegionRule {
 }
 
 impl RegionRule {
-    /// Fills, empties and names the volumes `outside + 1 .. end` on top of what the policy has chosen, where `volume_of` tells the one
-    /// around a point.
+    /// Fills, empties and names the volumes `outside + 1 .. end` on top of the policy's choice; `volume_of` returns the
+    /// volume around a point.
     ///
     /// Errors: [`BoundaryError::Seed`] names the seed.
     pub fn apply(
@@ -74,7 +74,7 @@ impl RegionRule {
         Ok(filled)
     }
 
-    /// Names from the surface's files, for what has none; where two contradict each other, neither.
+    /// Adds names from the surface's files to volumes without one; contradictory names are dropped.
     fn take_names(&self, filled: &mut Filled, mut volume_of: impl FnMut(Point) -> u32) {
         let mut found: BTreeMap<u32, BTreeSet<&str>> = BTreeMap::new();
         for seed in &self.names {

@@ -15,13 +15,13 @@
 
 use std::collections::BTreeMap;
 
-use super::chain::Trouble;
+use super::chain::PatchFailure;
+use super::complex::{TetComplex, sorted};
 use super::flips::Flipper;
 use super::free_vertex::moved;
-use super::kernel::HalfSpace;
-use super::patch::Patch;
+use super::inscribed_ball::HalfSpace;
+use super::patch::RecoveryPatch;
 use super::polygon::triangulate;
-use super::space::{Space, sorted};
 use super::target::RecoveryTarget;
 use super::walk::{self, ball, edge_at};
 use crate::mesh::FaceRef;
@@ -39,10 +39,10 @@ pub(super) struct CavitySkin {
 
 /// The fan of one facet around the vertex.
 pub(super) struct Fan {
-    pub(super) facet: usize,
+    pub facet: usize,
     /// In the facet's direction; open at the vertex if it lies on a segment.
-    pub(super) polygon: Vec<u32>,
-    pub(super) closed: bool,
+    pub polygon: Vec<u32>,
+    pub closed: bool,
 }
 
 /// The half-space behind a triangle; `None` when doubles see no normal.
@@ -51,7 +51,7 @@ pub(super) fn half_space([a, b, c]: [Point; 3]) -> Option<HalfSpace> {
     (normal != Point::ZERO).then(|| HalfSpace { normal, offset: normal.dot(a) })
 }
 
-impl<P: Pages> Patch<'_, P> {
+impl<P: Pages> RecoveryPatch<'_, P> {
     /// Removes edges of `x` that are on no facet, as far as that goes: fewer faces to be seen.
     pub(super) fn thin_out(&mut self, x: u32) {
         loop {
@@ -80,8 +80,8 @@ impl<P: Pages> Patch<'_, P> {
 
     /// Takes vertex `x` off the surface. Returns the number of vertices that replace it.
     ///
-    /// Where a sheet ends at `x`, a triangle on the other side of its segment stands in for the facet that is not there.
-    pub(super) fn suppress(&mut self, skin: &mut CavitySkin, x: u32) -> Result<u32, Trouble> {
+    /// If a sheet ends at `x`, a triangle on the other side of its segment replaces the missing facet.
+    pub(super) fn suppress(&mut self, skin: &mut CavitySkin, x: u32) -> Result<u32, PatchFailure> {
         self.thin_out(x);
         let ball = ball(self, x);
         let fans = self.fans(skin, x, &ball)?;
@@ -106,7 +106,7 @@ impl<P: Pages> Patch<'_, P> {
         x: u32,
         ball: Vec<u32>,
         fans: Vec<Fan>,
-    ) -> Result<u32, Trouble> {
+    ) -> Result<u32, PatchFailure> {
         if self.collapse_on_surface(skin, x, &ball, &fans) {
             return Ok(0);
         }
@@ -141,7 +141,7 @@ impl<P: Pages> Patch<'_, P> {
                     old.extend(&grown.cavity[wedge.tets.len()..]);
                 }
                 None => {
-                    return Err(Trouble::Precision(
+                    return Err(PatchFailure::Precision(
                         "doubles leave no place between it and its neighbors",
                     ));
                 }
@@ -157,13 +157,13 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// The fans of the facets around `x`.
-    fn fans(&mut self, skin: &CavitySkin, x: u32, ball: &[u32]) -> Result<Vec<Fan>, Trouble> {
+    fn fans(&mut self, skin: &CavitySkin, x: u32, ball: &[u32]) -> Result<Vec<Fan>, PatchFailure> {
         let mut edges: BTreeMap<usize, BTreeMap<u32, u32>> = BTreeMap::new();
         for &t in ball {
             let tet = self.tet(t);
             for i in (0..4).filter(|&i| tet.vertex(i) != x && tet.is_required(i)) {
                 let Some(&(facet, face)) = skin.faces.get(&sorted(tet.face(i))) else {
-                    return Err(Trouble::Broken("a facet of another patch at a new vertex"));
+                    return Err(PatchFailure::Broken("a facet of another patch at a new vertex"));
                 };
                 let k = face.iter().position(|&v| v == x).expect("a face of the ball");
                 edges.entry(facet).or_default().insert(face[(k + 1) % 3], face[(k + 2) % 3]);
@@ -185,7 +185,7 @@ impl<P: Pages> Patch<'_, P> {
                 at = q;
             }
             if polygon.len() != next.len() + usize::from(!closed) {
-                return Err(Trouble::Broken("a facet meets a vertex twice"));
+                return Err(PatchFailure::Broken("a facet meets a vertex twice"));
             }
             fans.push(Fan { facet, polygon, closed });
         }
@@ -233,7 +233,7 @@ impl<P: Pages> Patch<'_, P> {
         f: [u32; 3],
         polygon: &[u32],
         ball: &[u32],
-    ) -> Result<Vec<[u32; 3]>, Trouble> {
+    ) -> Result<Vec<[u32; 3]>, PatchFailure> {
         let mut off_plane = None;
         'search: for &t in ball {
             for v in self.tets_vertices(t) {
@@ -244,7 +244,7 @@ impl<P: Pages> Patch<'_, P> {
                 }
             }
         }
-        let (w, side) = off_plane.ok_or(Trouble::Broken("a flat ball"))?;
+        let (w, side) = off_plane.ok_or(PatchFailure::Broken("a flat ball"))?;
         let n = polygon.len();
         let found = triangulate(
             n,
@@ -261,7 +261,7 @@ impl<P: Pages> Patch<'_, P> {
                 ((q - p).cross(r - p).length() / longest).max(f64::MIN_POSITIVE)
             },
         );
-        let triangles = found.ok_or(Trouble::Broken("a fan without outline"))?;
+        let triangles = found.ok_or(PatchFailure::Broken("a fan without outline"))?;
         Ok(triangles.into_iter().map(|t| t.map(|i| polygon[i])).collect())
     }
 

@@ -1,6 +1,6 @@
-//! What is being recovered, and whether a new edge or face would stand in its way.
+//! The target of a recovery, and whether a new edge or face would cross it.
 
-use super::space::Space;
+use super::complex::TetComplex;
 
 /// The missing part; nothing new may cross it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,20 +9,20 @@ pub(super) enum RecoveryTarget {
     Face([u32; 3]),
     /// The plane of these three: no edge may cross it anywhere.
     Plane([u32; 3]),
-    /// Nothing is in the way of anything.
+    /// No edge or face is forbidden.
     Free,
 }
 
 impl RecoveryTarget {
-    /// Whether the new edge `x y`, with its faces to `c` and `d`, keeps clear of the target.
-    pub(super) fn allows_edge<S: Space>(self, s: &mut S, x: u32, y: u32, [c, d]: [u32; 2]) -> bool {
+    /// Returns whether the new edge `x y`, with its faces to `c` and `d`, keeps clear of the target.
+    pub fn allows_edge<S: TetComplex>(self, s: &mut S, x: u32, y: u32, [c, d]: [u32; 2]) -> bool {
         match self {
             Self::Edge(a, b) => {
                 !edge_meets_face(s, a, b, [x, y, c]) && !edge_meets_face(s, a, b, [x, y, d])
             }
             Self::Free => true,
             Self::Face(f) => {
-                // An edge with an end in the plane, which is on the facet or beside it, stays on its side.
+                // An edge with an end in the plane, on or off the facet, stays on its side.
                 let (sx, sy) = (s.orient([f[0], f[1], f[2], x]), s.orient([f[0], f[1], f[2], y]));
                 sx == 0.0 || sy == 0.0 || (sx > 0.0) == (sy > 0.0) || !edge_meets_face(s, x, y, f)
             }
@@ -33,8 +33,8 @@ impl RecoveryTarget {
         }
     }
 
-    /// Whether the new face keeps clear of the target, its edges being known to.
-    pub(super) fn allows_face<S: Space>(self, s: &mut S, face: [u32; 3]) -> bool {
+    /// Returns whether the new face keeps clear of the target, its edges being known to.
+    pub fn allows_face<S: TetComplex>(self, s: &mut S, face: [u32; 3]) -> bool {
         match self {
             Self::Edge(a, b) => !edge_meets_face(s, a, b, face),
             Self::Face(_) | Self::Plane(_) | Self::Free => true,
@@ -42,10 +42,10 @@ impl RecoveryTarget {
     }
 }
 
-/// Whether the segment `a b` meets the closed triangle elsewhere than in shared vertices.
+/// Returns whether the segment `a b` meets the closed triangle elsewhere than in shared vertices.
 ///
-/// Exact when it says no; a coplanar neighborhood may say yes without contact.
-pub(super) fn edge_meets_face<S: Space>(s: &mut S, a: u32, b: u32, f: [u32; 3]) -> bool {
+/// Exact if false; true may also occur in a coplanar neighborhood without contact.
+pub(super) fn edge_meets_face<S: TetComplex>(s: &mut S, a: u32, b: u32, f: [u32; 3]) -> bool {
     let (has_a, has_b) = (f.contains(&a), f.contains(&b));
     if has_a && has_b {
         return false;
@@ -65,7 +65,7 @@ pub(super) fn edge_meets_face<S: Space>(s: &mut S, a: u32, b: u32, f: [u32; 3]) 
 }
 
 /// The case of one shared vertex: the rest of the segment lies in the triangle's plane and corner.
-fn edge_runs_in_face<S: Space>(s: &mut S, a: u32, b: u32, f: [u32; 3]) -> bool {
+fn edge_runs_in_face<S: TetComplex>(s: &mut S, a: u32, b: u32, f: [u32; 3]) -> bool {
     let (h, goal) = if f.contains(&a) { (a, b) } else { (b, a) };
     if s.orient([f[0], f[1], f[2], goal]) != 0.0 {
         return false;

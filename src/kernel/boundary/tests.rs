@@ -1,4 +1,4 @@
-//! Made surfaces with known difficulties, and the real ones when they are at hand.
+//! Generated surfaces with known difficulties, and real ones if they are available.
 
 mod build;
 mod flood;

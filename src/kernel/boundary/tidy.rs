@@ -1,19 +1,20 @@
-//! Steiner points at the end of recovery: those nobody needs go, the others move away from the planes they were put beside.
+//! Steiner points at the end of recovery: removes unneeded ones, and moves the others away from the planes next to
+//! them.
 
+use super::complex::{PagedComplex, TetComplex};
 use super::free_vertex::{ball_flatness, remove_free};
-use super::kernel::{HalfSpace, center, room};
+use super::inscribed_ball::{HalfSpace, ball_center, clearance};
 use super::report::RecoveryReport;
-use super::space::{PagedSpace, Space};
 use super::suppress::half_space;
 use super::walk::ball;
 use crate::mesh::{Mesh, VertexTag};
 use tetdb_base::geom::{IdSet, Point};
 use tetdb_base::storage::{Pages, check_cancelled};
 
-/// Times all are visited: room grows by a factor each time.
+/// Rounds over all points: the clearance grows by a factor each time.
 const ROUNDS_MAX: usize = 8;
 
-/// A move that gives less room than this many times the old is not worth it.
+/// Least factor by which a move must raise the clearance.
 const GAIN_MIN: f64 = 1.25;
 
 /// Shares of the way to the best place that are tried.
@@ -30,7 +31,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
     };
     let mut left: Vec<u32> = (0..mesh.n_vertices()).filter(|&v| steiner(mesh, v)).collect();
     let none = IdSet::default();
-    // Beside what changed: for all others the answer is as it was.
+    // Only points next to a change are visited again.
     let mut beside: IdSet<u32> = left.iter().copied().collect();
     for _ in 0..ROUNDS_MAX {
         let due = std::mem::take(&mut beside);
@@ -39,7 +40,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
                 return true;
             }
             check_cancelled();
-            let mut s = PagedSpace(mesh, &none);
+            let mut s = PagedComplex(mesh, &none);
             let ball = ball(&mut s, v);
             let near: Vec<u32> = ball.iter().flat_map(|&t| s.tet(t).vertices()).collect();
             let flatness = ball_flatness(&mut s, v);
@@ -48,7 +49,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
                 s.drop_steiner(v);
                 report.steiner = report.steiner.saturating_sub(1);
             }
-            if is_gone || rise(&mut s, v) {
+            if is_gone || gain_clearance(&mut s, v) {
                 beside.extend(near);
             }
             !is_gone
@@ -59,8 +60,8 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
     }
 }
 
-/// Moves a free vertex to where it sees its ball best, if that gives it more room.
-pub(super) fn rise<P: Pages>(s: &mut PagedSpace<'_, P>, v: u32) -> bool {
+/// Moves a free vertex to the place of the largest clearance in its ball, if that gains enough.
+pub(super) fn gain_clearance<P: Pages>(s: &mut PagedComplex<'_, P>, v: u32) -> bool {
     let old = s.position(v);
     let ball = ball(s, v);
     let mut reach = 0.0f64;
@@ -72,13 +73,13 @@ pub(super) fn rise<P: Pages>(s: &mut PagedSpace<'_, P>, v: u32) -> bool {
         reach = corners.iter().map(|c| c.length()).fold(reach, f64::max);
         planes.extend(half_space(corners));
     }
-    let Some(way) = center(&planes, reach) else {
+    let Some(way) = ball_center(&planes, reach) else {
         return false;
     };
-    let now = room(&planes, Point::ZERO);
-    // Where doubles see the best place too dimly, one on the way there may do.
+    let now = clearance(&planes, Point::ZERO);
+    // If rounding rules out the best place, one on the way there may do.
     for share in SHARES {
-        if room(&planes, way * share) <= GAIN_MIN * now.max(0.0) {
+        if clearance(&planes, way * share) <= GAIN_MIN * now.max(0.0) {
             continue;
         }
         s.0.set_point(v, old + way * share);

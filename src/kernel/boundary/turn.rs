@@ -1,4 +1,4 @@
-//! Edges of a flat part of the surface, turned in their plane.
+//! Turns edges of a flat part of the surface in its plane.
 //!
 //! ```text
 //!        c                 c        The Delaunay mesh triangulates a flat part of the surface in its own way. It becomes the
@@ -7,22 +7,23 @@
 //!      \ | /             \   /      the crossing sees all their other faces, and both new triangles. A vertex of the ring may do
 //!        d                 d        as well; where none does, one is put there. The same below.
 //! ```
-//! A segment in the plane is reached by turning each edge it crosses, those that cannot turn yet after the others. New vertices crowd
-//! the plane: where that leaves no room, the tetrahedra above the edge grow to a cavity that swallows the ones before.
+//! A segment in the plane is recovered by turning each edge it crosses; edges that cannot turn yet are tried again
+//! later. New vertices crowd the plane. Where they leave too little clearance, the tetrahedra above the edge grow to a
+//! cavity that swallows earlier ones.
 //!
-//! Source: S. W. Sloan, "A fast algorithm for generating constrained Delaunay triangulations", Computers & Structures 47
-//! (1993), for the plane; the vertices above and below are our own.
+//! Source: S. W. Sloan, "A fast algorithm for generating constrained Delaunay triangulations", Computers & Structures
+//! 47 (1993), for the plane. The vertices above and below are not from it.
 
 use std::collections::VecDeque;
 
+use super::complex::{PagedComplex, TetComplex, edge_key};
 use super::free_vertex::remove_free;
 use super::grow::grow;
-use super::kernel::{HalfSpace, center, room};
+use super::inscribed_ball::{HalfSpace, ball_center, clearance};
 use super::map::MissingFacets;
 use super::report::RecoveryReport;
-use super::space::{PagedSpace, Space, edge_key};
 use super::suppress::half_space;
-use super::tidy::rise;
+use super::tidy::gain_clearance;
 use super::walk::{EdgeRing, Exit, crossings, edge_at, shell};
 use crate::mesh::Mesh;
 use tetdb_base::geom::{IdMap, IdSet, Point, orient};
@@ -40,13 +41,13 @@ const HALVES_MAX: i32 = 50;
 /// Times a place half as far from the crossing is tried for a cavity that grows.
 const GROWN_MAX: i32 = 24;
 
-/// A place with less room than this, in units of the tetrahedra around it, is second choice.
-const ROOM_MIN: f64 = 1e-4;
+/// A place with less clearance than this, in units of the tetrahedra around it, is second choice.
+const CLEARANCE_MIN: f64 = 1e-4;
 
 /// The segments, each from the end where more of them meet.
 ///
-/// Turned from there on, edges that cross one segment become edges of that end and are out of the way of all others: of a fan each is
-/// turned once or twice, from its rim a hundred times.
+/// Turned from that end, edges that cross one segment become edges of the end and are out of the way of all other
+/// segments. In a fan each edge is turned once or twice; starting from its outline, a hundred times.
 pub(super) fn from_hubs(segments: &[(u32, u32)]) -> Vec<(u32, u32)> {
     let mut meeting: IdMap<u32, u32> = IdMap::default();
     for v in segments.iter().flat_map(|&(a, b)| [a, b]) {
@@ -59,7 +60,7 @@ pub(super) fn from_hubs(segments: &[(u32, u32)]) -> Vec<(u32, u32)> {
     segments.iter().map(from_hub).collect()
 }
 
-/// Turns edges until the segment `a b` is there, and protects it; takes away again what was added and is not needed.
+/// Turns edges until the segment `a b` is there, and protects it; removes unneeded added vertices again.
 ///
 /// `false` when it does not run within one plane, or an edge cannot turn.
 pub(super) fn turn_segment<P: Pages>(
@@ -69,7 +70,7 @@ pub(super) fn turn_segment<P: Pages>(
     a: u32,
     b: u32,
 ) -> bool {
-    let mut s = PagedSpace(mesh, &missing.protected);
+    let mut s = PagedComplex(mesh, &missing.protected);
     let mut turner = Turner { s: &mut s, added: Vec::new(), balance: 0, turns: 0 };
     let recovered = turner.recover(a, b);
     turner.clear();
@@ -83,7 +84,7 @@ pub(super) fn turn_segment<P: Pages>(
 
 /// Turns edges for one segment after the other.
 struct Turner<'s, 'm, P: Pages> {
-    s: &'s mut PagedSpace<'m, P>,
+    s: &'s mut PagedComplex<'m, P>,
     /// Vertices added and still there.
     added: Vec<u32>,
     /// Vertices added less those taken away, which others may have added.
@@ -99,7 +100,7 @@ type Crossed = (u32, u32, u32);
 type Turned = (Crossed, bool);
 
 /// One side of the plane at an edge that turns.
-struct Side {
+struct PlaneSide {
     /// From one new corner to the other.
     ring: Vec<u32>,
     tets: Vec<u32>,
@@ -107,7 +108,7 @@ struct Side {
     others: IdSet<u32>,
 }
 
-/// What changes on one side of the plane.
+/// The changes on one side of the plane.
 struct Half {
     old: Vec<u32>,
     new: Vec<[u32; 4]>,
@@ -116,10 +117,10 @@ struct Half {
     lost: Vec<u32>,
 }
 
-/// How much a turn may do to find a place for a new vertex.
+/// Means of a turn to find a place for a new vertex.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reach {
-    /// Where there is room.
+    /// At a place with enough clearance.
     Roomy,
     /// In a cavity that grows until it is seen, and swallows added vertices.
     Grown,
@@ -128,7 +129,7 @@ enum Reach {
 }
 
 /// An edge `c d` with its tetrahedra, as it turns to `x y`.
-struct Turn {
+struct EdgeTurn {
     around: EdgeRing,
     c: u32,
     d: u32,
@@ -136,19 +137,19 @@ struct Turn {
     at_x: usize,
     /// Place of `y` in the ring, counted from `x`.
     to_y: usize,
-    /// Whether the segment crosses `x y` as well.
+    /// True if the segment crosses `x y` as well.
     crosses: bool,
 }
 
-impl Turn {
-    /// What lies above the plane, then below.
-    fn sides(&self) -> [Side; 2] {
+impl EdgeTurn {
+    /// The sides above and below the plane.
+    fn sides(&self) -> [PlaneSide; 2] {
         let n = self.around.ring.len();
         let from_to = [(self.at_x, self.to_y), (self.at_x + self.to_y, n - self.to_y)];
         let tets = from_to.map(|(from, len)| -> Vec<u32> {
             (0..len).map(|k| self.around.tets[(from + k) % n]).collect()
         });
-        [0, 1].map(|i| Side {
+        [0, 1].map(|i| PlaneSide {
             ring: (0..=from_to[i].1).map(|k| self.around.ring[(from_to[i].0 + k) % n]).collect(),
             tets: tets[i].clone(),
             others: tets[1 - i].iter().copied().collect(),
@@ -174,21 +175,21 @@ impl<P: Pages> Turner<'_, '_, P> {
             queue.push_back((tet, c, d));
         }
         let mut turns_left = TURNS_MAX * queue.len();
-        let mut in_vain = 0;
+        let mut n_failed = 0;
         while let Some(edge) = queue.pop_front() {
             if turns_left == 0 {
                 return false;
             }
             let Some((new, crosses)) = self.turn(edge, a, b) else {
-                in_vain += 1;
+                n_failed += 1;
                 queue.push_back(edge);
-                if in_vain == queue.len() {
+                if n_failed == queue.len() {
                     return false;
                 }
                 continue;
             };
             turns_left -= 1;
-            in_vain = 0;
+            n_failed = 0;
             if crosses {
                 queue.push_back(new);
             }
@@ -205,8 +206,8 @@ impl<P: Pages> Turner<'_, '_, P> {
 
     /// Turns `c d`, which the segment `a b` crosses, if that makes a new edge in the plane.
     ///
-    /// Added vertices lie the nearer to the plane the more of them there are: where they leave little room, one new vertex replaces them,
-    /// or those around the edge go or rise first.
+    /// The more added vertices there are, the nearer they lie to the plane. Where they leave little clearance, one new
+    /// vertex replaces them, or the vertices around the edge are removed or raised first.
     fn turn(&mut self, edge: Crossed, a: u32, b: u32) -> Option<Turned> {
         let turn = self.plan(edge, a, b)?;
         if let Some(turned) = self.carry_out(&turn, Reach::Roomy) {
@@ -216,7 +217,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         free.retain(|&v| self.s.is_steiner(v));
         for v in free {
             if !self.remove(v) {
-                rise(self.s, v);
+                gain_clearance(self.s, v);
             }
         }
         let turn = self.plan(edge, a, b)?;
@@ -239,8 +240,8 @@ impl<P: Pages> Turner<'_, '_, P> {
         self.added.retain(|&a| a != v);
     }
 
-    /// Which edge `c d` becomes; `None` where it has to stay, or the four corners are not convex.
-    fn plan(&mut self, (t, c, d): Crossed, a: u32, b: u32) -> Option<Turn> {
+    /// The new edge of `c d`; `None` if the edge is fixed, or the four corners are not convex.
+    fn plan(&mut self, (t, c, d): Crossed, a: u32, b: u32) -> Option<EdgeTurn> {
         if self.s.protects(c, d) {
             return None;
         }
@@ -258,7 +259,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         let (x, y) = (around.ring[at_x], around.ring[at_y]);
         // No tetrahedron is flat: the next of the ring is off the plane.
         let above = around.ring[(at_x + 1) % n];
-        let opposite = |s: &mut PagedSpace<'_, P>, [p, q]: [u32; 2], [u, v]: [u32; 2]| {
+        let opposite = |s: &mut PagedComplex<'_, P>, [p, q]: [u32; 2], [u, v]: [u32; 2]| {
             let (at_u, at_v) = (s.orient([p, q, u, above]), s.orient([p, q, v, above]));
             (at_u > 0.0 && at_v < 0.0) || (at_u < 0.0 && at_v > 0.0)
         };
@@ -266,11 +267,11 @@ impl<P: Pages> Turner<'_, '_, P> {
             return None;
         }
         let crosses = opposite(self.s, [a, b], [x, y]);
-        Some(Turn { around, c, d, at_x, to_y: at_y - at_x, crosses })
+        Some(EdgeTurn { around, c, d, at_x, to_y: at_y - at_x, crosses })
     }
 
-    /// Replaces the tetrahedra around the edge; `None`, and nothing changed, where there is no room.
-    fn carry_out(&mut self, turn: &Turn, reach: Reach) -> Option<Turned> {
+    /// Replaces the tetrahedra around the edge; `None`, with nothing changed, if there is no clearance.
+    fn carry_out(&mut self, turn: &EdgeTurn, reach: Reach) -> Option<Turned> {
         let [above, mut below] = turn.sides();
         let over = self.half(turn, &above, reach)?;
         below.others.extend(&over.old);
@@ -296,8 +297,8 @@ impl<P: Pages> Turner<'_, '_, P> {
         Some(((ids[at], x, y), turn.crosses))
     }
 
-    /// What changes on one side.
-    fn half(&mut self, turn: &Turn, side: &Side, reach: Reach) -> Option<Half> {
+    /// The changes on one side.
+    fn half(&mut self, turn: &EdgeTurn, side: &PlaneSide, reach: Reach) -> Option<Half> {
         let ring = &side.ring;
         let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
         for &p in &ring[1..ring.len() - 1] {
@@ -314,14 +315,14 @@ impl<P: Pages> Turner<'_, '_, P> {
     }
 
     /// The ring and the new triangles joined to a new vertex near the crossing.
-    fn join_to_new(&mut self, turn: &Turn, side: &Side, reach: Reach) -> Option<Half> {
+    fn join_to_new(&mut self, turn: &EdgeTurn, side: &PlaneSide, reach: Reach) -> Option<Half> {
         let (ring, c, d) = (&side.ring, turn.c, turn.d);
         let (x, y) = (ring[0], ring[ring.len() - 1]);
         let [pc, pd, px, py] = [c, d, x, y].map(|v| self.s.position(v));
         let origin = crossing([pc, pd], [px, py]);
         let mut size = 0.0f64;
         let mut planes: Vec<HalfSpace> = Vec::new();
-        let mut plane = |s: &mut PagedSpace<'_, P>, corners: [u32; 3]| {
+        let mut plane = |s: &mut PagedComplex<'_, P>, corners: [u32; 3]| {
             let corners = corners.map(|v| s.position(v) - origin);
             size = corners.iter().map(|c| c.length()).fold(size, f64::max);
             planes.extend(half_space(corners));
@@ -332,11 +333,11 @@ impl<P: Pages> Turner<'_, '_, P> {
         }
         plane(self.s, [y, c, x]);
         plane(self.s, [d, y, x]);
-        // Where all is seen best, or straight up from the crossing where that is too near for doubles to find.
+        // The place of largest clearance, or straight up from the crossing if that is too near for doubles.
         let up = (py - px).cross(pd - pc).normalize_or_zero() * size;
         let up = if orient(pc, py, px, origin + up) > 0.0 { up } else { -up };
-        let best = center(&planes, size);
-        let is_roomy = best.is_some_and(|way| room(&planes, way) > ROOM_MIN * size);
+        let best = ball_center(&planes, size);
+        let is_roomy = best.is_some_and(|way| clearance(&planes, way) > CLEARANCE_MIN * size);
         let p = self.s.add_steiner(origin);
         let mut found = None;
         if is_roomy || reach == Reach::Crowded {
@@ -369,8 +370,8 @@ impl<P: Pages> Turner<'_, '_, P> {
     /// vertices inside it go.
     fn join_grown(
         &mut self,
-        turn: &Turn,
-        side: &Side,
+        turn: &EdgeTurn,
+        side: &PlaneSide,
         p: u32,
         [origin, up]: [Point; 2],
     ) -> Option<Half> {
@@ -385,7 +386,7 @@ impl<P: Pages> Turner<'_, '_, P> {
             let Ok(grown) = grow(self.s, &side.tets, p, None, &[], &side.others) else {
                 continue;
             };
-            // Around the rim of a flat part it could come to its other side.
+            // Around the outline of a flat part the cavity could reach its other side.
             let is_beside = |&t: &u32| {
                 let corners = self.s.tet(t).vertices();
                 corners.iter().all(|&v| self.s.orient([c, y, x, v]) >= 0.0)
@@ -430,7 +431,7 @@ fn joined(ring: &[u32], c: u32, d: u32, p: u32) -> Vec<[u32; 4]> {
     quads
 }
 
-/// Where the line through two points passes the line through two others, nearly.
+/// Nearest point of the line through two points to the line through two others, nearly.
 fn crossing([c, d]: [Point; 2], [x, y]: [Point; 2]) -> Point {
     let normal = (d - c).cross(y - x);
     let across = normal.cross(y - x);

@@ -1,6 +1,6 @@
 //! Exact walks: from a vertex towards another, around an edge, along a missing edge.
 
-use super::space::Space;
+use super::complex::TetComplex;
 use crate::mesh::{FaceRef, Tet};
 use tetdb_base::geom::IdSet;
 use tetdb_base::storage::check_cancelled;
@@ -8,7 +8,7 @@ use tetdb_base::storage::check_cancelled;
 /// Steps towards a direction inside one ball before all of it is searched.
 const TURNS_MAX: u32 = 400;
 
-/// What a straight line meets next.
+/// The next part that a straight line meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Exit {
     /// The goal: it is a vertex of this tetrahedron.
@@ -32,7 +32,7 @@ pub(super) fn swapped(tet: &Tet, i: usize, v: u32) -> [u32; 4] {
 }
 
 /// The tetrahedron of the ball of `h` whose closed cone at `h` holds `b`; it has `b` iff the edge exists.
-pub(super) fn cone<S: Space>(s: &mut S, h: u32, b: u32) -> Option<u32> {
+pub(super) fn cone<S: TetComplex>(s: &mut S, h: u32, b: u32) -> Option<u32> {
     let mut t = s.tet_of(h);
     for step in 0..TURNS_MAX {
         let tet = s.tet(t);
@@ -40,7 +40,7 @@ pub(super) fn cone<S: Space>(s: &mut S, h: u32, b: u32) -> Option<u32> {
         if tet.local(b).is_some() {
             return Some(t);
         }
-        match leaves_cone(s, &tet, i, b, step) {
+        match separating_face(s, &tet, i, b, step) {
             None => return Some(t),
             Some(j) => {
                 let across = s.across(t, j);
@@ -55,19 +55,25 @@ pub(super) fn cone<S: Space>(s: &mut S, h: u32, b: u32) -> Option<u32> {
     ball.into_iter().find(|&t| {
         let tet = s.tet(t);
         tet.local(b).is_some()
-            || tet.local(h).is_some_and(|i| leaves_cone(s, &tet, i, b, 0).is_none())
+            || tet.local(h).is_some_and(|i| separating_face(s, &tet, i, b, 0).is_none())
     })
 }
 
 /// A face at vertex `i` that strictly separates the cone from `b`.
-fn leaves_cone<S: Space>(s: &mut S, tet: &Tet, i: usize, b: u32, turn: u32) -> Option<usize> {
+fn separating_face<S: TetComplex>(
+    s: &mut S,
+    tet: &Tet,
+    i: usize,
+    b: u32,
+    turn: u32,
+) -> Option<usize> {
     (0..3)
         .map(|k| (i + 1 + (k + turn as usize) % 3) & 3)
         .find(|&j| s.orient(swapped(tet, j, b)) < 0.0)
 }
 
 /// All tetrahedra that have `v`.
-pub(super) fn ball<S: Space>(s: &mut S, v: u32) -> Vec<u32> {
+pub(super) fn ball<S: TetComplex>(s: &mut S, v: u32) -> Vec<u32> {
     check_cancelled();
     let first = s.tet_of(v);
     let mut seen: IdSet<u32> = IdSet::from_iter([first]);
@@ -90,13 +96,13 @@ pub(super) fn ball<S: Space>(s: &mut S, v: u32) -> Vec<u32> {
 }
 
 /// A tetrahedron that has the edge `a b`, if the edge exists.
-pub(super) fn find_edge<S: Space>(s: &mut S, a: u32, b: u32) -> Option<u32> {
+pub(super) fn find_edge<S: TetComplex>(s: &mut S, a: u32, b: u32) -> Option<u32> {
     let t = cone(s, a, b)?;
     s.tet(t).local(b).map(|_| t)
 }
 
-/// The same, where `t` had the edge when it was last looked at.
-pub(super) fn edge_at<S: Space>(s: &mut S, t: u32, a: u32, b: u32) -> Option<u32> {
+/// A tetrahedron that has the edge `a b`, where `t` had it before.
+pub(super) fn edge_at<S: TetComplex>(s: &mut S, t: u32, a: u32, b: u32) -> Option<u32> {
     let tet = s.tet(t);
     let still = tet.is_live() && tet.local(a).is_some() && tet.local(b).is_some();
     if still { Some(t) } else { find_edge(s, a, b) }
@@ -109,11 +115,11 @@ pub(super) fn edge_at<S: Space>(s: &mut S, t: u32, a: u32, b: u32) -> Option<u32
 pub(super) struct EdgeRing {
     pub tets: Vec<u32>,
     pub ring: Vec<u32>,
-    /// Whether a required face has the edge.
+    /// True if a required face has the edge.
     pub required: bool,
 }
 
-/// The two vertices beside `c` and `d`, so that `c d x y` is positive.
+/// The two vertices other than `c` and `d`, so that `c d x y` is positive.
 pub(super) fn opposite(tet: &Tet, c: u32, d: u32) -> Option<(usize, usize)> {
     let (i, j) = (tet.local(c)?, tet.local(d)?);
     let mut rest = (0..4).filter(|&k| k != i && k != j);
@@ -125,7 +131,7 @@ pub(super) fn opposite(tet: &Tet, c: u32, d: u32) -> Option<(usize, usize)> {
 }
 
 /// The shell of the edge `c d` of tetrahedron `t`; `None` when it reaches the hull.
-pub(super) fn shell<S: Space>(s: &mut S, t: u32, c: u32, d: u32) -> Option<EdgeRing> {
+pub(super) fn shell<S: TetComplex>(s: &mut S, t: u32, c: u32, d: u32) -> Option<EdgeRing> {
     // Every flip and every search comes by here.
     check_cancelled();
     let mut shell = EdgeRing { tets: Vec::new(), ring: Vec::new(), required: false };
@@ -148,8 +154,8 @@ pub(super) fn shell<S: Space>(s: &mut S, t: u32, c: u32, d: u32) -> Option<EdgeR
     }
 }
 
-/// What the line from vertex `h` to `b` meets first.
-pub(super) fn exit_vertex<S: Space>(s: &mut S, h: u32, b: u32) -> Exit {
+/// The first part that the line from vertex `h` to `b` meets.
+pub(super) fn exit_vertex<S: TetComplex>(s: &mut S, h: u32, b: u32) -> Exit {
     let Some(t) = cone(s, h, b) else {
         return Exit::Lost;
     };
@@ -175,8 +181,8 @@ pub(super) fn exit_vertex<S: Space>(s: &mut S, h: u32, b: u32) -> Exit {
     }
 }
 
-/// What the line `a b` meets after it crossed the inside of `face`.
-pub(super) fn exit_face<S: Space>(s: &mut S, a: u32, b: u32, face: FaceRef) -> Exit {
+/// The part that the line `a b` meets after the inside of `face`.
+pub(super) fn exit_face<S: TetComplex>(s: &mut S, a: u32, b: u32, face: FaceRef) -> Exit {
     let across = s.across(face.tet(), face.face());
     if !across.exists() {
         return Exit::Lost;
@@ -202,8 +208,8 @@ pub(super) fn exit_face<S: Space>(s: &mut S, a: u32, b: u32, face: FaceRef) -> E
     Exit::Vertex(e)
 }
 
-/// What the line `a b` meets after it crossed the inside of the edge `c d` of `t`.
-pub(super) fn exit_edge<S: Space>(s: &mut S, a: u32, b: u32, t: u32, c: u32, d: u32) -> Exit {
+/// The part that the line `a b` meets after the inside of the edge `c d` of `t`.
+pub(super) fn exit_edge<S: TetComplex>(s: &mut S, a: u32, b: u32, t: u32, c: u32, d: u32) -> Exit {
     let Some(shell) = shell(s, t, c, d) else {
         return Exit::Lost;
     };
@@ -242,8 +248,8 @@ pub(super) fn exit_edge<S: Space>(s: &mut S, a: u32, b: u32, t: u32, c: u32, d: 
     Exit::Lost
 }
 
-/// Everything the missing edge `a b` crosses, from `a` on; `Err` names what ends the walk early.
-pub(super) fn crossings<S: Space>(
+/// All parts that the missing edge `a b` crosses, from `a` on; `Err` is the part that ends the walk early.
+pub(super) fn crossings<S: TetComplex>(
     s: &mut S,
     a: u32,
     b: u32,

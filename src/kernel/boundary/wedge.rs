@@ -1,20 +1,20 @@
-//! The wedges of a ball between facets, and places in them for a vertex that sees all around.
+//! Wedges of a ball between facets, and places in them for a vertex that sees all faces.
 
 use std::collections::BTreeSet;
 
-use super::chain::Trouble;
+use super::chain::PatchFailure;
+use super::complex::{TetComplex, sorted};
 use super::free_vertex::moved;
-use super::grow::{Grown, Obstacle, grow};
-use super::kernel::{center, room};
-use super::patch::Patch;
-use super::space::{Space, sorted};
+use super::grow::{GrownCavity, Obstacle, grow};
+use super::inscribed_ball::{ball_center, clearance};
+use super::patch::RecoveryPatch;
 use super::suppress::{CavitySkin, Fan, half_space};
 use super::walk::swapped;
 use tetdb_base::geom::{Dyadic, IdSet, Point};
 use tetdb_base::storage::Pages;
 
 /// A place nearer than this to the planes around it, in units of the wedge, is second choice.
-const ROOM_MIN: f64 = 1e-3;
+const CLEARANCE_MIN: f64 = 1e-3;
 
 /// Required faces beyond a wedge that may be added to its bounds, one after the other.
 const FIRM_MAX: usize = 24;
@@ -23,7 +23,7 @@ const FIRM_MAX: usize = 24;
 const NEARER_MAX: i32 = 16;
 
 /// Vertices of a wedge between which directions into it are looked for.
-const WAYS_MAX: usize = 12;
+const DIRECTIONS_MAX: usize = 12;
 
 /// Times an exact place is looked for half as far away.
 const HALVES_MAX: usize = 400;
@@ -33,19 +33,19 @@ const FINE: f64 = 1.0 / 65536.0;
 
 /// Tetrahedra of the ball between the same facets.
 pub(super) struct Wedge {
-    pub(super) tets: Vec<u32>,
+    pub tets: Vec<u32>,
     /// Fans that bound it, and the sign of the side it is on.
-    pub(super) walls: Vec<(usize, bool)>,
+    pub walls: Vec<(usize, bool)>,
 }
 
-impl<P: Pages> Patch<'_, P> {
+impl<P: Pages> RecoveryPatch<'_, P> {
     pub(super) fn wedges(
         &mut self,
         skin: &CavitySkin,
         x: u32,
         ball: &[u32],
         fans: &[Fan],
-    ) -> Result<Vec<Wedge>, Trouble> {
+    ) -> Result<Vec<Wedge>, PatchFailure> {
         let mut seen: IdSet<u32> = IdSet::default();
         let mut wedges = Vec::new();
         for &first in ball {
@@ -80,7 +80,7 @@ impl<P: Pages> Patch<'_, P> {
             }
             let both = |&(fan, above): &(usize, bool)| wedge.walls.contains(&(fan, !above));
             if wedge.walls.iter().any(both) {
-                return Err(Trouble::Broken("a facet does not separate its sides"));
+                return Err(PatchFailure::Broken("a facet does not separate its sides"));
             }
             wedges.push(wedge);
         }
@@ -123,14 +123,14 @@ impl<P: Pages> Patch<'_, P> {
         None
     }
 
-    /// The wedge and its walls joined to a new vertex inside; `taken` holds the ball and what other wedges took.
+    /// The wedge and its walls joined to a new vertex inside; `taken` has the ball and the tetrahedra of other wedges.
     pub(super) fn join_to_new(
         &mut self,
         x: u32,
         wedge: &Wedge,
         walls: &[[u32; 3]],
         taken: &IdSet<u32>,
-    ) -> Option<Grown> {
+    ) -> Option<GrownCavity> {
         let origin = self.position(x);
         let mut reach = 0.0f64;
         let mut planes = Vec::new();
@@ -156,9 +156,9 @@ impl<P: Pages> Patch<'_, P> {
             plane([q, p, r].map(|v| self.offset(x, v)), true);
         }
         let mut proposals: Vec<(Point, bool)> = Vec::new();
-        let best = center(&planes, reach);
-        let roomy = best.is_some_and(|d| room(&planes, d) > ROOM_MIN * reach);
-        let heart = self.heart(x, wedge);
+        let best = ball_center(&planes, reach);
+        let roomy = best.is_some_and(|d| clearance(&planes, d) > CLEARANCE_MIN * reach);
+        let mean_direction = self.mean_direction(x, wedge);
         let halves = |d: Point, n: i32| (0..n).map(move |k| d * 0.5f64.powi(k));
         if let Some(d) = best.filter(|_| roomy) {
             proposals.push((d, false));
@@ -169,7 +169,7 @@ impl<P: Pages> Patch<'_, P> {
             let reach = reach * 0.125f64.powi(nearer);
             let mut met = firm.clone();
             for _ in 0..FIRM_MAX {
-                let Some(d) = center(&met, reach) else { break };
+                let Some(d) = ball_center(&met, reach) else { break };
                 match self.join_at(x, wedge, walls, taken, origin + d, true) {
                     Ok(grown) => return Some(grown),
                     Err(Obstacle::Required(face)) => {
@@ -182,24 +182,24 @@ impl<P: Pages> Patch<'_, P> {
                 }
             }
         }
-        proposals.extend(halves(heart, 24).map(|d| (d, true)));
+        proposals.extend(halves(mean_direction, 24).map(|d| (d, true)));
         if let Some(d) = best {
             proposals.extend(halves(d, 45).map(|d| (d, false)));
         }
-        proposals.extend(halves(heart, 45).map(|d| (d, false)));
+        proposals.extend(halves(mean_direction, 45).map(|d| (d, false)));
         let found = proposals.into_iter().find_map(|(d, may_grow)| {
             self.join_at(x, wedge, walls, taken, origin + d, may_grow).ok()
         });
         if found.is_some() || !self.effort.exact {
             return found;
         }
-        let mut ways: Vec<Point> = best.into_iter().chain([heart]).collect();
-        ways.extend(self.ways(x, wedge, walls));
-        ways.into_iter().find_map(|way| self.join_near(x, wedge, walls, way))
+        let mut directions: Vec<Point> = best.into_iter().chain([mean_direction]).collect();
+        directions.extend(self.directions(x, wedge, walls));
+        directions.into_iter().find_map(|way| self.join_near(x, wedge, walls, way))
     }
 
     /// Directions into the cone between the walls: to vertices of the wedge, to the middle between two, and away from it.
-    fn ways(&self, x: u32, wedge: &Wedge, walls: &[[u32; 3]]) -> Vec<Point> {
+    fn directions(&self, x: u32, wedge: &Wedge, walls: &[[u32; 3]]) -> Vec<Point> {
         let corners = wedge
             .tets
             .iter()
@@ -208,7 +208,7 @@ impl<P: Pages> Patch<'_, P> {
         let corners: BTreeSet<u32> = corners.filter(|&v| v != x).collect();
         let mut to: Vec<Point> = corners.iter().map(|&v| self.offset(x, v)).collect();
         to.retain(|&d| d.length() > 0.0);
-        let n = to.len().min(WAYS_MAX);
+        let n = to.len().min(DIRECTIONS_MAX);
         for i in 0..n {
             for j in 0..i {
                 let between = to[i].normalize() + to[j].normalize();
@@ -226,15 +226,15 @@ impl<P: Pages> Patch<'_, P> {
         wedge: &Wedge,
         walls: &[[u32; 3]],
         mut way: Point,
-    ) -> Option<Grown> {
+    ) -> Option<GrownCavity> {
         let from = self.exact_place(x);
         for _ in 0..HALVES_MAX {
-            // Half of what is seen leaves room on both sides.
+            // Half of the visible distance leaves clearance on both sides.
             way *= 0.5;
             let exact = from.moved(way, &Dyadic::from(way.length() * FINE));
             let p = self.add_vertex(exact.rounded(), Some(exact));
             let mut quads: Vec<[u32; 4]> = walls.iter().map(|&[a, b, c]| [a, b, c, p]).collect();
-            // The walls lie in planes through `x`: a way behind one of them is behind it everywhere.
+            // The walls lie in planes through `x`: a direction behind one of them is behind it everywhere.
             let between_walls = quads.iter().all(|&q| self.orient(q) > 0.0);
             let grown = between_walls.then(|| self.join_all(x, wedge, p));
             if let Some(Some(mut grown)) = grown {
@@ -258,7 +258,7 @@ impl<P: Pages> Patch<'_, P> {
         taken: &IdSet<u32>,
         place: Point,
         may_grow: bool,
-    ) -> Result<Grown, Obstacle> {
+    ) -> Result<GrownCavity, Obstacle> {
         let p = self.add_vertex(place, None);
         let quads: Vec<[u32; 4]> = walls.iter().map(|&[a, b, c]| [a, b, c, p]).collect();
         let mut grown = Err(Obstacle::Other);
@@ -266,7 +266,8 @@ impl<P: Pages> Patch<'_, P> {
             grown = if may_grow {
                 let mut others = taken.clone();
                 others.retain(|t| !wedge.tets.contains(t));
-                grow(self, &wedge.tets, p, Some(x), walls, &others).and_then(Grown::losing_none)
+                grow(self, &wedge.tets, p, Some(x), walls, &others)
+                    .and_then(GrownCavity::without_lost_vertices)
             } else {
                 self.join_all(x, wedge, p).ok_or(Obstacle::Other)
             };
@@ -279,13 +280,13 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// The wedge with `x` moved to `p`, if all volumes stay positive.
-    pub(super) fn join_all(&mut self, x: u32, wedge: &Wedge, p: u32) -> Option<Grown> {
+    pub(super) fn join_all(&mut self, x: u32, wedge: &Wedge, p: u32) -> Option<GrownCavity> {
         let quads = moved(self, x, p, &wedge.tets, &mut 0)?;
-        Some(Grown { cavity: wedge.tets.clone(), quads, lost: Vec::new() })
+        Some(GrownCavity { cavity: wedge.tets.clone(), quads, lost: Vec::new() })
     }
 
     /// From `x` to the mean of the wedge's other vertices: a direction to try when the planes give none.
-    fn heart(&mut self, x: u32, wedge: &Wedge) -> Point {
+    fn mean_direction(&mut self, x: u32, wedge: &Wedge) -> Point {
         let mut sum = Point::ZERO;
         let mut n = 0.0;
         for &t in &wedge.tets {

@@ -3,14 +3,14 @@
 //! Gathering only marks; [`Kernel::discard`] takes the marks back and [`Kernel::fill`] makes the
 //! change. Between the two a caller may look at the outer faces and decide.
 
-use super::kernel::{CavityFace, Kernel, Located, Rejected};
+use super::kernel::{CavityFace, Kernel, PointLocation, Rejected};
 use crate::mesh::anatomy::mark::{IN_CAVITY, STAYS};
 use crate::mesh::anatomy::{FACES, MARK, REQUIRED, VERTEX_MASK};
 use crate::mesh::{FaceRef, Mesh, Tet};
-use tetdb_base::geom::{Point, Seen, in_sphere_perturbed, insphere_filtered, orient};
+use tetdb_base::geom::{Point, RelativePoint, in_sphere_perturbed, insphere_filtered, orient};
 use tetdb_base::storage::{Pages, check_cancelled};
 
-/// A larger cavity is refused: nothing a size field asks for is so large.
+/// A larger cavity is refused: no size field needs one so large.
 const CAVITY_MAX: usize = 1 << 20;
 
 impl Kernel {
@@ -31,14 +31,14 @@ impl Kernel {
 
     /// Marks the cavity of `p` and lists its outer faces; required faces are kept.
     ///
-    /// The cavity is made star-shaped around `p` exactly, and refused when a vertex would be left without
-    /// tetrahedra. `refuses` is asked about vertices met on the way, those of `start` excepted; the first refusal ends all.
-    /// On errors nothing stays marked. After success either [`Kernel::fill`] or [`Kernel::discard`] must follow.
+    /// The cavity is made star-shaped around `p` exactly, and refused if a vertex would be left without tetrahedra.
+    /// `refuses` is called for vertices met on the way, except those of `start`; the first refusal ends the call. On
+    /// errors nothing stays marked. After success either [`Kernel::fill`] or [`Kernel::discard`] must follow.
     pub fn gather_constrained<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         p: Point,
-        start: &Located,
+        start: &PointLocation,
         refuses: impl FnMut(&mut Mesh<P>, u32) -> bool,
     ) -> Result<(), Rejected> {
         self.gather::<P, true>(mesh, p, start, refuses)?;
@@ -68,7 +68,7 @@ impl Kernel {
         &mut self,
         mesh: &mut Mesh<P>,
         p: Point,
-        start: &Located,
+        start: &PointLocation,
         mut refuses: impl FnMut(&mut Mesh<P>, u32) -> bool,
     ) -> Result<(), Rejected> {
         if let Some(i) = start.points.iter().position(|&q| q == p) {
@@ -90,8 +90,13 @@ impl Kernel {
             let tet = mesh.tet(t);
             let corners = mesh.points(&tet);
             let [a, b, c, d] = corners;
-            let seen = [Seen::new(a, p), Seen::new(b, p), Seen::new(c, p), Seen::new(d, p)];
-            // What lies across the face of entry is in the cavity; the first tetrahedron was entered from nowhere.
+            let seen = [
+                RelativePoint::new(a, p),
+                RelativePoint::new(b, p),
+                RelativePoint::new(c, p),
+                RelativePoint::new(d, p),
+            ];
+            // The tetrahedron across the face of entry is in the cavity; the first tetrahedron has no face of entry.
             let n = if next == 0 { 4 } else { 3 };
             next += 1;
             for k in 1..=n {
@@ -105,7 +110,7 @@ impl Kernel {
                     };
                     self.stats.sphere_tests += 1;
                     // The neighbor shares this face; only its apex is new.
-                    let apex = Seen::new(mesh.point(v), p);
+                    let apex = RelativePoint::new(mesh.point(v), p);
                     let det = insphere_filtered(&apex, &seen[f], &seen[h], &seen[g]);
                     if det > 0.0 || (det == 0.0 && in_conflict(mesh, across.tet(), p)) {
                         mesh.set_mark(across.tet(), IN_CAVITY, true);
@@ -142,14 +147,14 @@ impl Kernel {
 
     /// Takes tetrahedra out of the cavity until `p` sees all its faces from inside.
     ///
-    /// Those with a blind face go, and what they alone connected goes with them.
+    /// Tetrahedra with a blind face are removed, and so are those that they alone connect.
     fn correct<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         p: Point,
-        start: &Located,
+        start: &PointLocation,
     ) -> Result<(), Rejected> {
-        // What is left in the end is the largest part without a blind outer face, whatever the order.
+        // The remaining part is the largest one without a blind outer face, in any order.
         let mut suspects = std::mem::take(&mut self.suspects);
         suspects.clear();
         for &k in &self.blind {
@@ -191,7 +196,7 @@ impl Kernel {
         if self.buries(start.record.vertices()) { Err(Rejected::Buries) } else { Ok(()) }
     }
 
-    /// Whether a vertex of the cavity is on none of its outer faces.
+    /// Returns whether a vertex of the cavity is on none of its outer faces.
     fn buries(&self, first: [u32; 4]) -> bool {
         let numbered = self.numbered;
         let mut vertices = first.iter().chain(&self.apexes);
@@ -233,7 +238,7 @@ impl Kernel {
         if self.numbered { self.links.n_local() } else { self.outer.len() }
     }
 
-    /// Keeps what is still connected to `seed` through marked tetrahedra; lists the outer faces anew.
+    /// Keeps the tetrahedra still connected to `seed` through marked ones; lists the outer faces again.
     fn reflood<P: Pages>(&mut self, mesh: &mut Mesh<P>, seed: u32) {
         let before = std::mem::take(&mut self.cavity);
         self.faces.clear();
@@ -378,7 +383,7 @@ fn in_conflict<P: Pages>(mesh: &mut Mesh<P>, t: u32, p: Point) -> bool {
 /// Vertices of a cavity the matrix of links can number.
 const CAVITY_SMALL: usize = 64;
 
-/// Writes the tetrahedron of `v` and an outer face, and tells the tetrahedron beyond.
+/// Writes the tetrahedron of `v` and an outer face, and links the tetrahedron beyond.
 #[inline]
 fn write_new<P: Pages>(mesh: &mut Mesh<P>, v: u32, t: u32, face: &CavityFace, inner: [u32; 3]) {
     let [a, b, c] = face.vertices;

@@ -1,12 +1,12 @@
-//! The enclosing box: eight vertices around everything, so that no insertion meets the hull.
+//! The enclosing box: eight vertices around all points, so that no insertion meets the hull.
 
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use tetdb_base::geom::{Aabb, Point, in_sphere_perturbed, orient};
 use tetdb_base::storage::Pages;
 
-/// Half side of the box in units of the longest side of what it encloses. Far enough that surface
-/// triangles are hardly ever lost to the box vertices, near enough to keep sphere determinants small.
+/// Half side of the box in units of the longest side of the enclosed bounds. Far enough that surface triangles are
+/// hardly ever lost to the box vertices, near enough to keep sphere determinants small.
 const MARGIN: f64 = 3.0;
 
 /// Makes the Delaunay mesh of a cube around `bounds` and returns one of its tetrahedra.

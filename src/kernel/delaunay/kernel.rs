@@ -1,10 +1,10 @@
-//! The insertion kernel: its scratch, and what walking, gathering and filling report.
+//! The insertion kernel: its scratch data and its results.
 
 use super::links::Links;
 use crate::mesh::{FaceRef, Tet};
 use tetdb_base::geom::Point;
 
-/// Why a point was not inserted; the mesh is as before.
+/// Reasons why a point was not inserted; the mesh is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rejected {
     /// The walk left the mesh or started nowhere.
@@ -30,7 +30,7 @@ pub struct CavityFace {
     pub outside: FaceRef,
     /// The face from the inside: a tetrahedron of the cavity.
     pub inside: FaceRef,
-    /// Whether the face is required.
+    /// True if the face is required.
     pub required: bool,
 }
 
@@ -47,7 +47,7 @@ pub struct KernelStats {
     pub cavity_largest: u64,
     /// Insphere tests.
     pub sphere_tests: u64,
-    /// Cavities that had to be made smaller to be star-shaped.
+    /// Cavities that had to shrink to be star-shaped.
     pub shrunk: u64,
 }
 
@@ -93,9 +93,9 @@ impl Default for Kernel {
     }
 }
 
-/// Where a walk ended.
+/// End of a walk.
 #[derive(Clone, Copy, Debug)]
-pub struct Located {
+pub struct PointLocation {
     /// Index of the tetrahedron.
     pub tet: u32,
     /// Its vertices and neighbors.

@@ -22,7 +22,7 @@ pub(super) struct Links {
 }
 
 impl Links {
-    pub(super) fn new() -> Self {
+    pub fn new() -> Self {
         Self {
             places: [0; TABLE],
             epoch: 0,
@@ -33,7 +33,7 @@ impl Links {
     }
 
     /// Starts a new surface.
-    pub(super) fn begin(&mut self) {
+    pub fn begin(&mut self) {
         self.n_local = 0;
         self.sorted.clear();
         self.epoch += 1;
@@ -43,7 +43,7 @@ impl Links {
         }
     }
 
-    /// Where `v` is, or the empty place where it would be put; and what is there.
+    /// The slot of `v` or the empty slot for it, its value, and whether `v` is in it.
     #[inline(always)]
     fn find(&self, v: u32) -> (usize, u64, bool) {
         let key = self.epoch << 32 | u64::from(v);
@@ -62,7 +62,7 @@ impl Links {
 
     /// The local number of vertex `v`, given at its first call; `None` when there are too many.
     #[inline(always)]
-    pub(super) fn local(&mut self, v: u32) -> Option<u8> {
+    pub fn local(&mut self, v: u32) -> Option<u8> {
         let (at, found, is_there) = self.find(v);
         if is_there {
             return Some(found as u8);
@@ -75,42 +75,42 @@ impl Links {
         Some(self.n_local as u8 - 1)
     }
 
-    /// Whether `v` has a local number in this surface.
+    /// Returns whether `v` has a local number in this surface.
     #[inline]
-    pub(super) fn knows(&self, v: u32) -> bool {
+    pub fn knows(&self, v: u32) -> bool {
         self.find(v).2
     }
 
     /// Vertices numbered so far.
-    pub(super) fn n_local(&self) -> usize {
+    pub fn n_local(&self) -> usize {
         self.n_local
     }
 
     /// Enters the half-face of the edge between two local numbers.
     #[inline]
-    pub(super) fn set(&mut self, a: u8, b: u8, half_face: u32) {
+    pub fn set(&mut self, a: u8, b: u8, half_face: u32) {
         self.matrix[(usize::from(a) % LOCAL_MAX) * LOCAL_MAX + usize::from(b) % LOCAL_MAX] =
             half_face;
     }
 
     /// The half-face of the edge a → b.
     #[inline]
-    pub(super) fn get(&self, a: u8, b: u8) -> u32 {
+    pub fn get(&self, a: u8, b: u8) -> u32 {
         self.matrix[(usize::from(a) % LOCAL_MAX) * LOCAL_MAX + usize::from(b) % LOCAL_MAX]
     }
 
     /// Enters an edge of a surface too large for the matrix.
-    pub(super) fn push_sorted(&mut self, a: u32, b: u32, half_face: u32) {
+    pub fn push_sorted(&mut self, a: u32, b: u32, half_face: u32) {
         self.sorted.push((a, b, half_face));
     }
 
     /// Ends entering; [`Links::find_sorted`] may follow.
-    pub(super) fn sort(&mut self) {
+    pub fn sort(&mut self) {
         self.sorted.sort_unstable();
     }
 
     /// The half-face of the edge a → b of a large surface.
-    pub(super) fn find_sorted(&self, a: u32, b: u32) -> Option<u32> {
+    pub fn find_sorted(&self, a: u32, b: u32) -> Option<u32> {
         let at = self.sorted.binary_search_by_key(&(a, b), |&(a, b, _)| (a, b));
         at.ok().map(|i| self.sorted[i].2)
     }

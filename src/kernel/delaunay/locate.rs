@@ -1,6 +1,6 @@
-//! Find the tetrahedron of a point by walking through faces.
+//! Finds the tetrahedron of a point by walking through faces.
 
-use super::kernel::{Kernel, Located, Rejected};
+use super::kernel::{Kernel, PointLocation, Rejected};
 use crate::mesh::Mesh;
 use crate::mesh::anatomy::FACES;
 use tetdb_base::geom::{Point, orient};
@@ -12,8 +12,8 @@ const STEPS_MAX: u32 = 100_000;
 impl Kernel {
     /// The tetrahedron that holds `p` (in its interior or on its boundary), walking from `hint`.
     ///
-    /// Each step leaves through a face that strictly separates the tetrahedron from `p`, the first
-    /// one found in an order that changes from step to step, so that no cycle is walked for ever.
+    /// Each step leaves through a face that strictly separates the tetrahedron from `p`. The order in which faces are
+    /// tested changes from step to step, so that no cycle is walked for ever.
     ///
     /// Errors: [`Rejected::Outside`] when the walk leaves the mesh, or `hint` is not in use.
     pub fn locate<P: Pages>(
@@ -21,7 +21,7 @@ impl Kernel {
         mesh: &mut Mesh<P>,
         p: Point,
         hint: u32,
-    ) -> Result<Located, Rejected> {
+    ) -> Result<PointLocation, Rejected> {
         let mut tet = hint;
         let mut record = mesh.tet(tet);
         if !record.is_live() {
@@ -46,7 +46,7 @@ impl Kernel {
             }
             self.turn = self.turn.wrapping_mul(1_664_525).wrapping_add(1_013_904_223) ^ (step >> 3);
             let Some(i) = exit else {
-                return Ok(Located { tet, record, points });
+                return Ok(PointLocation { tet, record, points });
             };
             let across = record.neighbor[i];
             if !across.exists() {

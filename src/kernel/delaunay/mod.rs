@@ -1,4 +1,4 @@
-//! Insert one point: locate, cavity, ball.
+//! Inserts one point: locate, cavity, ball.
 //!
 //! `T_{i+1} = T_i − C_P + B_P`: the cavity C_P holds the tetrahedra whose circumsphere contains P,
 //! corrected so that it keeps required faces and is star-shaped around P; the ball of insertion B_P
@@ -17,5 +17,5 @@ mod order;
 mod tests;
 
 pub use enclosing::enclose;
-pub use kernel::{CavityFace, Kernel, KernelStats, Located, Rejected};
+pub use kernel::{CavityFace, Kernel, KernelStats, PointLocation, Rejected};
 pub use order::insertion_key;

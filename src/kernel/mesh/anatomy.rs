@@ -13,11 +13,11 @@ pub const MARK: u32 = 1 << 30;
 /// Flag of a tetrahedron's attribute: it has a face on an interface, and no later vertex may destroy it.
 pub const FROZEN: u32 = 1;
 
-/// Which node's [`MARK`] means what: four notes about a tetrahedron, one owner each.
+/// Meaning of the [`MARK`] of each node: four notes about a tetrahedron, one owner each.
 pub mod mark {
     /// It is in the cavity being gathered. Owner: the Delaunay kernel, down between its calls.
     pub const IN_CAVITY: usize = 0;
-    /// It was looked at, and nothing near it changed since. Owner: refinement, then optimization.
+    /// It was examined, and nothing near it changed since. Owner: refinement, then optimization.
     pub const EXAMINED: usize = 1;
     /// It stays in the cavity being shrunk. Owner: the Delaunay kernel, down between its calls.
     pub const STAYS: usize = 2;
@@ -50,7 +50,7 @@ impl FaceRef {
     pub const fn face(self) -> usize {
         (self.0 & 3) as usize
     }
-    /// Whether there is a tetrahedron.
+    /// Returns whether there is a tetrahedron.
     #[inline]
     pub const fn exists(self) -> bool {
         self.0 != NONE
@@ -78,7 +78,7 @@ impl Tet {
     pub fn vertex(&self, i: usize) -> u32 {
         self.node[i & 3] & VERTEX_MASK
     }
-    /// Whether face `i` is required.
+    /// Returns whether face `i` is required.
     #[inline]
     pub fn is_required(&self, i: usize) -> bool {
         self.node[i] & REQUIRED != 0
@@ -94,7 +94,7 @@ impl Tet {
     pub fn local(&self, v: u32) -> Option<usize> {
         (0..4).find(|&i| self.vertex(i) == v)
     }
-    /// Whether the slot is in use.
+    /// Returns whether the slot is in use.
     #[inline]
     pub fn is_live(&self) -> bool {
         self.node[0] != NONE
@@ -109,7 +109,7 @@ impl Tet {
             neighbor: [FaceRef(w(4)), FaceRef(w(5)), FaceRef(w(6)), FaceRef(w(7))],
         }
     }
-    /// Makes a record.
+    /// Packs the record.
     #[inline(always)]
     pub fn to_slot(self) -> Slot {
         let (n, m) = (self.node, self.neighbor);

@@ -4,7 +4,7 @@ use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, Slot, u32_l
 
 use super::anatomy::mark::IN_CAVITY;
 use super::anatomy::{FaceRef, MARK, REQUIRED, Tet, VERTEX_MASK};
-use super::state::{Arena, MeshState, dense, next_id, sparse};
+use super::state::{IdPool, MeshState, dense, next_id, sparse};
 use tetdb_base::storage::{Pager, Pages, SharedPages, StorageError, kind, raise};
 
 /// Cursor over one sub-domain's paged arrays: tetrahedra, vertices, their attributes, facets.
@@ -37,7 +37,7 @@ impl<P: Pages> Mesh<P> {
         Self { pages, state }
     }
 
-    /// The counts to keep beside the pages.
+    /// The counts to store with the pages.
     pub fn state(&self) -> MeshState {
         self.state
     }
@@ -56,9 +56,7 @@ impl<P: Pages> Mesh<P> {
     /// Writes a record to an id that may lie in the next page not yet there.
     #[inline(always)]
     pub(super) fn place_record<const K: usize>(&mut self, to: u32, record: Slot) {
-        if to >> SLOT_BITS == self.pages.n_pages::<K>() {
-            self.pages.append_page::<K>();
-        }
+        self.pages.append_up_to::<K>(to);
         *self.pages.write::<K>(to) = record;
     }
 
@@ -66,7 +64,7 @@ impl<P: Pages> Mesh<P> {
     pub(super) fn attribute_before<const K: usize>(&mut self, id: u32, first: u32) -> (u32, u32) {
         match attribute_place(id).0 >> SLOT_BITS < first {
             true => self.attribute::<K>(id),
-            // Never set: what is there by now belongs to the new array.
+            // Never set: the page there belongs to the new array by now.
             false => (0, 0),
         }
     }
@@ -83,12 +81,10 @@ impl<P: Pages> Mesh<P> {
         }
         let (record, word) = attribute_place(to);
         let record = record + (first << SLOT_BITS);
-        while record >> SLOT_BITS >= self.pages.n_pages::<K>() {
-            self.pages.append_page::<K>();
-        }
+        self.pages.append_up_to::<K>(record);
         let slot = self.pages.write::<K>(record);
-        slot[word] = u32_le::from_native(a);
-        slot[word + 1] = u32_le::from_native(b);
+        slot[word] = a.into();
+        slot[word + 1] = b.into();
     }
 
     /// The mesh as several threads may read it, when all of it is in memory.
@@ -102,7 +98,7 @@ impl<P: Pages> Mesh<P> {
         &self.pages
     }
 
-    /// The pages themselves, for what is not tetrahedra, vertices or facets.
+    /// The pages themselves, for data other than tetrahedra, vertices or facets.
     pub fn pages_mut(&mut self) -> &mut P {
         &mut self.pages
     }
@@ -113,25 +109,23 @@ impl<P: Pages> Mesh<P> {
     }
 
     #[inline]
-    pub(super) fn take<const K: usize>(
+    pub(super) fn take_id<const K: usize>(
         pages: &mut P,
-        arena: &mut Arena,
+        pool: &mut IdPool,
         what: &'static str,
     ) -> u32 {
-        arena.n_live += 1;
-        if arena.free_head != NONE {
-            let id = arena.free_head;
-            arena.free_head = pages.read::<K>(id)[1].to_native();
+        pool.n_live += 1;
+        if pool.free_head != NONE {
+            let id = pool.free_head;
+            pool.free_head = pages.read::<K>(id)[1].to_native();
             return id;
         }
-        let id = arena.fresh;
+        let id = pool.fresh;
         if id >= VERTEX_MASK - SLOTS as u32 {
             raise(StorageError::TooMany { what });
         }
-        if id >> SLOT_BITS == pages.n_pages::<K>() {
-            pages.append_page::<K>();
-        }
-        arena.fresh = next_id(id);
+        pages.append_up_to::<K>(id);
+        pool.fresh = next_id(id);
         id
     }
 
@@ -178,13 +172,13 @@ impl<P: Pages> Mesh<P> {
     /// Replaces one node word, flags included.
     #[inline(always)]
     pub fn set_node(&mut self, t: u32, i: usize, node: u32) {
-        self.pages.write::<{ kind::TETS }>(t)[i] = u32_le::from_native(node);
+        self.pages.write::<{ kind::TETS }>(t)[i] = node.into();
     }
 
     /// Replaces one neighbor.
     #[inline(always)]
     pub fn set_neighbor(&mut self, face: FaceRef, to: FaceRef) {
-        self.pages.write::<{ kind::TETS }>(face.tet())[4 + face.face()] = u32_le::from_native(to.0);
+        self.pages.write::<{ kind::TETS }>(face.tet())[4 + face.face()] = to.0.into();
     }
 
     /// Makes two faces neighbors of each other; either may be [`FaceRef::NONE`].
@@ -219,24 +213,22 @@ impl<P: Pages> Mesh<P> {
         *word = u32_le::from_native(if marked { bits | MARK } else { bits & !MARK });
     }
 
-    /// An unused tetrahedron id; its record is whatever was there, its attribute too.
+    /// An unused tetrahedron id; its record and attribute are arbitrary.
     #[inline]
     pub fn take_tet(&mut self) -> u32 {
-        Self::take::<{ kind::TETS }>(&mut self.pages, &mut self.state.tets, "tetrahedra")
+        Self::take_id::<{ kind::TETS }>(&mut self.pages, &mut self.state.tets, "tetrahedra")
     }
 
     /// Takes the ids of `n` tetrahedra of a mesh that has none; each is then to be placed once, in any order.
     pub fn take_tets(&mut self, n: u32) {
         debug_assert_eq!(self.state.tets.fresh, 0);
-        self.state.tets = Arena { fresh: sparse(n), free_head: NONE, n_live: n };
+        self.state.tets = IdPool { fresh: sparse(n), free_head: NONE, n_live: n };
     }
 
     /// Writes a tetrahedron whose id was taken by [`Mesh::take_tets`], or is to lie behind all.
     #[inline]
     pub fn place_tet(&mut self, t: u32, tet: Tet) {
-        while t >> SLOT_BITS >= self.pages.n_pages::<{ kind::TETS }>() {
-            self.pages.append_page::<{ kind::TETS }>();
-        }
+        self.pages.append_up_to::<{ kind::TETS }>(t);
         self.set_tet(t, tet);
     }
 
@@ -244,8 +236,8 @@ impl<P: Pages> Mesh<P> {
     pub fn free_tet(&mut self, t: u32) {
         let slot = self.pages.write::<{ kind::TETS }>(t);
         *slot = [WORD_ZERO; 8];
-        slot[0] = u32_le::from_native(NONE);
-        slot[1] = u32_le::from_native(self.state.tets.free_head);
+        slot[0] = NONE.into();
+        slot[1] = self.state.tets.free_head.into();
         self.state.tets.free_head = t;
         self.state.tets.n_live -= 1;
     }
@@ -287,12 +279,10 @@ impl<P: Pages> Mesh<P> {
 
     pub(super) fn set_attribute<const K: usize>(&mut self, id: u32, first: u32, second: u32) {
         let (record, word) = attribute_place(id);
-        while record >> SLOT_BITS >= self.pages.n_pages::<K>() {
-            self.pages.append_page::<K>();
-        }
+        self.pages.append_up_to::<K>(record);
         let slot = self.pages.write::<K>(record);
-        slot[word] = u32_le::from_native(first);
-        slot[word + 1] = u32_le::from_native(second);
+        slot[word] = first.into();
+        slot[word + 1] = second.into();
     }
 
     /// Points `tet_of` of every vertex to its tetrahedron of smallest id: one pass in page order.
@@ -324,13 +314,17 @@ impl<P: Pages> Mesh<P> {
     #[inline]
     pub fn set_scratch(&mut self, n: u32, word: u32) {
         let slot = sparse(n >> 3);
-        while slot >> SLOT_BITS >= self.pages.n_pages::<{ kind::SCRATCH }>() {
-            self.pages.append_page::<{ kind::SCRATCH }>();
-        }
-        self.pages.write::<{ kind::SCRATCH }>(slot)[n as usize & 7] = u32_le::from_native(word);
+        self.pages.append_up_to::<{ kind::SCRATCH }>(slot);
+        self.pages.write::<{ kind::SCRATCH }>(slot)[n as usize & 7] = word.into();
     }
 
-    /// Forgets the scratch map.
+    /// Clears the scratch map and sets its first `n` words.
+    pub fn reset_scratch(&mut self, n: u32, word: u32) {
+        self.clear_scratch();
+        (0..n).for_each(|k| self.set_scratch(k, word));
+    }
+
+    /// Clears the scratch map.
     pub fn clear_scratch(&mut self) {
         self.pages.clear::<{ kind::SCRATCH }>();
     }

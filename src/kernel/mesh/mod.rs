@@ -6,15 +6,15 @@ mod faces;
 mod renumber;
 mod scan;
 mod snapshot;
+mod speculation;
 mod state;
-mod trial;
 mod vertices;
 
 pub use anatomy::{FaceRef, Tet};
 pub use cursor::Mesh;
-pub use faces::{Facet, InterfaceFace, SHEET};
+pub use faces::{MeshFacet, MeshInterfaceFace, SHEET};
 pub use renumber::{Workspace, renumber};
 pub use scan::{Scan, scan_parts, tets_of_page};
+pub use speculation::{DraftState, Evaluated, Speculation, evaluate_speculatively};
 pub use state::{MESH_STATE_WORDS, MeshState, dense, next_id, sparse};
-pub use trial::{Draft, Foreseen, Trial, look_ahead};
 pub use vertices::{End, VertexTag};

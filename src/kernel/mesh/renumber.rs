@@ -15,7 +15,7 @@ use super::state::{dense, sparse};
 use super::vertices::VertexTag;
 use super::{FaceRef, MeshState};
 use tetdb_base::geom::HilbertFrame;
-use tetdb_base::storage::{DiskPath, Keyed, Pages, Sorter, StorageError, kind};
+use tetdb_base::storage::{DiskPath, KeyedId, Pages, Sorter, StorageError, kind};
 use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS};
 
 /// Where sorting may put its runs, and how many bytes it may hold.
@@ -163,16 +163,16 @@ struct Keys<'a> {
 
 impl Scan for Keys<'_> {
     type Part = Range<u32>;
-    type Output = Vec<Keyed>;
+    type Output = Vec<KeyedId>;
 
-    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<u32>) -> Vec<Keyed> {
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<u32>) -> Vec<KeyedId> {
         let mut keys = Vec::with_capacity(part.len());
         for n in part.clone() {
             let id = sparse(n);
             // A surface vertex may have no tetrahedron, when its facets lie between empty regions.
             if self.in_use.has(n) || mesh.vertex_attribute(id).0 == VertexTag::Surface {
                 let key = self.order.index(mesh.point(id));
-                keys.push(Keyed { key, id });
+                keys.push(KeyedId { key, id });
             }
         }
         keys

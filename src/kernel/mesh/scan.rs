@@ -1,4 +1,4 @@
-//! Looking at many pages of a mesh that nobody changes meanwhile: on all threads of the run when it is in memory and any is to spare.
+//! Scans many pages of an unchanging mesh, on all free threads if the mesh is in memory.
 
 use rayon::prelude::*;
 use tetdb_schema::page::SLOT_BITS;
@@ -10,15 +10,15 @@ use tetdb_base::storage::{Pages, check_cancelled, parallel, spare_threads};
 pub trait Scan: Sync {
     /// A part: a page of tetrahedra, a range of edges.
     type Part: Sync;
-    /// What is found in a part.
+    /// Result for a part.
     type Output: Send;
     /// Looks at a part. Is not to change the mesh.
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Self::Part) -> Self::Output;
 }
 
-/// Scans parts; what is found comes in the order of the parts, whoever scanned them.
+/// Scans parts; results come in the order of the parts.
 ///
-/// Memory: what is found in all parts: give few at a time where that is much.
+/// Memory: the results of all parts; pass few parts at a time if results are large.
 pub fn scan_parts<P: Pages, S: Scan>(
     mesh: &mut Mesh<P>,
     parts: &[S::Part],

@@ -1,13 +1,14 @@
-//! A working mesh as records to keep: all of it in its own order, less what follows from the rest.
+//! A working mesh as records to store, in its own order, without derived data.
 //!
-//! Left out are neighbors, which are matched again; wanted lengths and `tet_of`, which whoever goes on with the mesh sets anew.
+//! Left out are neighbors, which are matched again, and wanted lengths and `tet_of`, which are set anew by the next
+//! step.
 
 use tetdb_schema::record::{self, CoarseFace, CoarseTet, CoarseVertex};
 
 use super::anatomy::{MARK, REQUIRED, VERTEX_MASK};
 use super::cursor::Mesh;
 use super::state::{dense, sparse};
-use super::{FaceRef, Facet, InterfaceFace, Tet, Workspace};
+use super::{FaceRef, MeshFacet, MeshInterfaceFace, Tet, Workspace};
 use tetdb_base::geom::orient;
 use tetdb_base::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
 
@@ -18,13 +19,13 @@ sort_record! {
         vertices: [u32; 3],
         /// A [`FaceRef`].
         place: u32,
-        /// Whether the order in which they turn is an odd one of the ascending.
+        /// True if the order in which they turn is an odd one of the ascending.
         is_odd: bool,
     }
 }
 
 impl SortedFace {
-    fn of(tet: &Tet, place: FaceRef) -> Self {
+    fn new(tet: &Tet, place: FaceRef) -> Self {
         let [a, b, c] = tet.face(place.face());
         let mut vertices = [a, b, c];
         vertices.sort_unstable();
@@ -38,7 +39,7 @@ impl SortedFace {
 }
 
 impl<P: Pages> Mesh<P> {
-    /// Whether ids have no gaps, as they have none after [`renumber`](super::renumber): only such a mesh can be kept.
+    /// Returns whether ids have no gaps, as they have none after [`renumber`](super::renumber): only such a mesh can be kept.
     pub fn is_dense(&self) -> bool {
         dense(self.tet_ids_end()) == self.n_tets()
             && dense(self.vertex_ids_end()) == self.n_vertices()
@@ -111,7 +112,7 @@ impl<P: Pages> Mesh<P> {
 
     /// Adds a facet as it was kept.
     pub fn add_snapshot_facet(&mut self, facet: &record::Facet) {
-        self.add_facet(Facet {
+        self.add_facet(MeshFacet {
             vertices: facet.vertices.map(sparse),
             label: facet.label,
             input: facet.triangle,
@@ -121,7 +122,7 @@ impl<P: Pages> Mesh<P> {
 
     /// Adds an interface face as it was kept.
     pub fn add_snapshot_face(&mut self, face: &CoarseFace) {
-        self.add_interface_face(InterfaceFace {
+        self.add_interface_face(MeshInterfaceFace {
             vertices: face.vertices.map(sparse),
             cut: face.cut,
             index: face.index,
@@ -143,7 +144,7 @@ impl<P: Pages> Mesh<P> {
                 return Ok(false);
             }
             for i in 0..4 {
-                faces.push(SortedFace::of(&tet, FaceRef::new(t, i)))?;
+                faces.push(SortedFace::new(&tet, FaceRef::new(t, i)))?;
             }
             if t & 1023 == 0 {
                 check_cancelled();

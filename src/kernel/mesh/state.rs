@@ -1,18 +1,18 @@
-//! Ids of records, and how many of each kind there are.
+//! Ids of records, and the number of records of each kind.
 
 use rkyv::{Archive, Deserialize, Serialize};
 use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK};
 
 /// Records of one kind: ids handed out in order, freed slots used again, last freed first.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
-pub(super) struct Arena {
+pub(super) struct IdPool {
     /// The next id never used.
-    pub(super) fresh: u32,
-    pub(super) free_head: u32,
-    pub(super) n_live: u32,
+    pub fresh: u32,
+    pub free_head: u32,
+    pub n_live: u32,
 }
 
-impl Default for Arena {
+impl Default for IdPool {
     fn default() -> Self {
         Self { fresh: 0, free_head: NONE, n_live: 0 }
     }
@@ -24,10 +24,10 @@ pub const MESH_STATE_WORDS: usize = 12;
 /// Counts that, with the pages, are the whole state of a working mesh.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeshState {
-    pub(super) tets: Arena,
-    pub(super) vertices: Arena,
-    pub(super) facets: Arena,
-    pub(super) interface_faces: Arena,
+    pub(super) tets: IdPool,
+    pub(super) vertices: IdPool,
+    pub(super) facets: IdPool,
+    pub(super) interface_faces: IdPool,
 }
 
 impl MeshState {
@@ -38,22 +38,23 @@ impl MeshState {
         n_facets: u32,
         n_interface_faces: u32,
     ) -> Self {
-        let arena = |n: u32| Arena { fresh: sparse(n), free_head: NONE, n_live: n };
+        let pool = |n: u32| IdPool { fresh: sparse(n), free_head: NONE, n_live: n };
         Self {
-            tets: arena(n_tets),
-            vertices: arena(n_vertices),
-            facets: arena(n_facets),
-            interface_faces: arena(n_interface_faces),
+            tets: pool(n_tets),
+            vertices: pool(n_vertices),
+            facets: pool(n_facets),
+            interface_faces: pool(n_interface_faces),
         }
     }
 
-    /// Whether so many pages of tetrahedra, vertices, facets and interface faces have room for the ids counted here: false only for damage.
+    /// Returns whether so many pages of tetrahedra, vertices, facets and interface faces contain the ids counted here:
+    /// false only for damage.
     pub fn fits(&self, n_pages: [u32; 4]) -> bool {
         let arenas = [self.tets, self.vertices, self.facets, self.interface_faces];
-        arenas.iter().zip(n_pages).all(|(arena, n)| {
-            let ids = u64::from(dense(arena.fresh));
-            let is_free = arena.free_head == NONE || u64::from(dense(arena.free_head)) < ids;
-            ids <= u64::from(n) * RECORDS as u64 && u64::from(arena.n_live) <= ids && is_free
+        arenas.iter().zip(n_pages).all(|(pool, n)| {
+            let ids = u64::from(dense(pool.fresh));
+            let is_free = pool.free_head == NONE || u64::from(dense(pool.free_head)) < ids;
+            ids <= u64::from(n) * RECORDS as u64 && u64::from(pool.n_live) <= ids && is_free
         })
     }
 
@@ -62,29 +63,20 @@ impl MeshState {
         self.tets.n_live
     }
 
-    /// The counts as numbers, for storing beside the pages.
+    /// The counts as numbers, to store with the pages.
     pub fn to_words(self) -> [u32; MESH_STATE_WORDS] {
-        let [t, v, f, i] = [self.tets, self.vertices, self.facets, self.interface_faces];
-        [
-            t.fresh,
-            t.free_head,
-            t.n_live,
-            v.fresh,
-            v.free_head,
-            v.n_live,
-            f.fresh,
-            f.free_head,
-            f.n_live,
-            i.fresh,
-            i.free_head,
-            i.n_live,
-        ]
+        let mut words = [0; MESH_STATE_WORDS];
+        let pools = [self.tets, self.vertices, self.facets, self.interface_faces];
+        for (words, pool) in words.chunks_exact_mut(3).zip(pools) {
+            words.copy_from_slice(&[pool.fresh, pool.free_head, pool.n_live]);
+        }
+        words
     }
 
     /// The inverse of [`MeshState::to_words`].
     pub fn from_words(w: [u32; MESH_STATE_WORDS]) -> Self {
-        let arena = |i: usize| Arena { fresh: w[i], free_head: w[i + 1], n_live: w[i + 2] };
-        Self { tets: arena(0), vertices: arena(3), facets: arena(6), interface_faces: arena(9) }
+        let pool = |i: usize| IdPool { fresh: w[i], free_head: w[i + 1], n_live: w[i + 2] };
+        Self { tets: pool(0), vertices: pool(3), facets: pool(6), interface_faces: pool(9) }
     }
 }
 

@@ -8,7 +8,7 @@ use super::state::{dense, sparse};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{Pages, kind};
 
-/// Where a vertex comes from; the numbers are stored.
+/// Origin of a vertex; the numbers are stored.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u32)]
 pub enum VertexTag {
@@ -31,7 +31,7 @@ pub struct End {
     pub point: Point,
     /// Wanted edge length.
     pub h: f32,
-    /// Whether it may never move; see [`Mesh::is_fixed`].
+    /// True if it may never move; see [`Mesh::is_fixed`].
     pub fixed: bool,
 }
 
@@ -123,7 +123,7 @@ impl<P: Pages> Mesh<P> {
         *word = u32_le::from_native(word.to_native() & FIXED | h.to_bits() & !FIXED);
     }
 
-    /// Whether `v` may never move: it belongs to a facet, an interface or the enclosing box.
+    /// Returns whether `v` may never move: it belongs to a facet, an interface or the enclosing box.
     #[inline(always)]
     pub fn is_fixed(&mut self, v: u32) -> bool {
         self.pages.read::<{ kind::VERTICES }>(v)[6].to_native() & FIXED != 0
@@ -135,16 +135,19 @@ impl<P: Pages> Mesh<P> {
         self.pages.read::<{ kind::VERTICES }>(v)[7].to_native()
     }
 
-    /// Tells a tetrahedron that has `v`. Insertion does not keep this up; flips do.
+    /// Sets a tetrahedron that has `v`. Insertion does not keep this up; flips do.
     #[inline]
     pub fn set_tet_of(&mut self, v: u32, t: u32) {
-        self.pages.write::<{ kind::VERTICES }>(v)[7] = u32_le::from_native(t);
+        self.pages.write::<{ kind::VERTICES }>(v)[7] = t.into();
     }
 
     /// Adds a vertex.
     pub fn add_vertex(&mut self, p: Point, h: f32) -> u32 {
-        let v =
-            Self::take::<{ kind::VERTICES }>(&mut self.pages, &mut self.state.vertices, "vertices");
+        let v = Self::take_id::<{ kind::VERTICES }>(
+            &mut self.pages,
+            &mut self.state.vertices,
+            "vertices",
+        );
         self.set_point(v, p);
         self.set_size(v, h);
         self.set_tet_of(v, NONE);
@@ -155,9 +158,9 @@ impl<P: Pages> Mesh<P> {
     pub fn free_vertex(&mut self, v: u32) {
         let slot = self.pages.write::<{ kind::VERTICES }>(v);
         *slot = [WORD_ZERO; 8];
-        slot[0] = u32_le::from_native(NONE);
-        slot[1] = u32_le::from_native(self.state.vertices.free_head);
-        slot[7] = u32_le::from_native(NONE);
+        slot[0] = NONE.into();
+        slot[1] = self.state.vertices.free_head.into();
+        slot[7] = NONE.into();
         self.state.vertices.free_head = v;
         self.state.vertices.n_live -= 1;
     }
@@ -206,7 +209,7 @@ impl<P: Pages> Mesh<P> {
         self.attribute::<{ kind::VERTEX_ATTRIBUTES }>(v)
     }
 
-    /// Sets the words of the attribute of `v`; the tag in them says whether it is fixed.
+    /// Sets the words of the attribute of `v`; the tag in them decides whether it is fixed.
     pub(super) fn set_vertex_words(&mut self, v: u32, tag: u32, owner: u32) {
         let free = [VertexTag::Free, VertexTag::Steiner].map(|tag| tag as u32);
         self.set_fixed(v, !free.contains(&(tag & TAG_MASK)));

@@ -4,7 +4,7 @@
 //! that touch it would stay as they are. Here each bad one counts as one and what it lacks, and their sum has to fall.
 
 use crate::mesh::{Mesh, Tet};
-use tetdb_base::shape::{GOODNESS_WANTED, inverse_quality};
+use tetdb_base::shape::{INVERSE_QUALITY_WANTED, inverse_quality};
 use tetdb_base::storage::Pages;
 
 /// What a bad tetrahedron costs besides the goodness it lacks (at most 0.5). With 0.25, a few are made a little better rather than one good
@@ -75,12 +75,12 @@ impl AcceptanceFloor {
 
 #[inline]
 fn worth(good: f64) -> f64 {
-    if good >= GOODNESS_WANTED {
+    if good >= INVERSE_QUALITY_WANTED {
         0.0
     } else if good > 0.1 {
-        good - GOODNESS_WANTED - EACH
+        good - INVERSE_QUALITY_WANTED - EACH
     } else {
-        good - GOODNESS_WANTED - EACH - POOR
+        good - INVERSE_QUALITY_WANTED - EACH - POOR
     }
 }
 

@@ -1,6 +1,6 @@
 //! What rounds aim at, one aim after the other, and what they have done.
 
-use tetdb_base::shape::GOODNESS_WANTED;
+use tetdb_base::shape::INVERSE_QUALITY_WANTED;
 
 /// What a round aims at.
 #[derive(Clone, Copy)]
@@ -24,8 +24,11 @@ pub(super) enum Means {
 }
 
 /// The first aim: every tetrahedron of q ≥ 2, without changing the vertices' number.
-pub(super) const BAD: RoundGoal =
-    RoundGoal { below: GOODNESS_WANTED, enough: GOODNESS_WANTED * 1.02, means: Means::Connections };
+pub(super) const BAD: RoundGoal = RoundGoal {
+    below: INVERSE_QUALITY_WANTED,
+    enough: INVERSE_QUALITY_WANTED * 1.02,
+    means: Means::Connections,
+};
 
 /// The second aim: what is still at q ≥ 3 after the first.
 pub(super) const WORST: RoundGoal =
@@ -33,7 +36,7 @@ pub(super) const WORST: RoundGoal =
 
 /// The third aim: what is still at q >= 2 after the others.
 pub(super) const SHARE: RoundGoal =
-    RoundGoal { below: GOODNESS_WANTED, enough: GOODNESS_WANTED, means: Means::Sum };
+    RoundGoal { below: INVERSE_QUALITY_WANTED, enough: INVERSE_QUALITY_WANTED, means: Means::Sum };
 
 /// Accepted operations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

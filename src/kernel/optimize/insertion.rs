@@ -6,7 +6,7 @@
 
 use super::deficit::{Deficit, GAIN};
 use super::smooth::{ROUNDING, Star, raised};
-use crate::delaunay::{Kernel, Located};
+use crate::delaunay::{Kernel, PointLocation};
 use crate::mesh::anatomy::{EDGES, FACES};
 use crate::mesh::{Mesh, Tet};
 use crate::reconnect::Inherited;
@@ -59,7 +59,7 @@ impl Inserter {
         let length = |e: usize| (points[EDGES[e][0]] - points[EDGES[e][1]]).length_squared();
         let longest = (1..6).fold(0, |best, e| if length(e) > length(best) { e } else { best });
         let centroid = (points[0] + points[1] + points[2] + points[3]) * 0.25;
-        let start = Located { tet: t, record: *tet, points };
+        let start = PointLocation { tet: t, record: *tet, points };
         for p in [centroid, middle(longest), middle(5 - longest)] {
             // The tetrahedron itself would not be left in the cavity: most of the middles are on the surface.
             let is_blocked = |i: usize| {

@@ -3,9 +3,11 @@
 //! 1. `lawson`: flips until no face is found that is not locally Delaunay and can be flipped.
 //! 2. `odt`: free vertices move to where an optimal Delaunay triangulation has them, then 1 again; a few sweeps.
 //! 3. `rounds`: every tetrahedron with q ≥ 2 is attacked by edge removal, then face swap, then smoothing.
-//! 4. `rescue`: what is still worst is attacked by collapse and insertion too.
-//! 5. `share`: what is still bad, beside what the surface spoils, is attacked by all of these, judged by their sum.
-//! 6. `mend`: what is far worse than the surface forces (`bound`) is attacked, worst first, by vertices in growing cavities too.
+//! 4. `rounds` for the goal `WORST`: the worst tetrahedra left are attacked by collapse and insertion too.
+//! 5. `rounds` for the goal `SHARE`: bad tetrahedra left, except those the surface forces, are attacked by all
+//!    of these; the sum over the tetrahedra involved decides.
+//! 6. `mend`: tetrahedra far worse than the surface forces (`shape`) are attacked, worst first, also by vertices in growing
+//!    cavities.
 //!
 //! Placement of points alone leaves 86 to 90 % of the tetrahedra below q = 2 and slivers without bound;
 //! steps 1 and 2 give 97 %, step 3 aimed at *every* q ≥ 2 gives 99 % and more. Aimed only at q ≥ 2.86

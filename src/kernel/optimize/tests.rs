@@ -227,7 +227,7 @@ fn paging_changes_nothing() {
         subdomain: 0,
         generation: 1,
         spill: dir.path().into(),
-        made: None,
+        output: None,
         base: None,
         cache_bytes: 4 << 20,
     };

@@ -7,7 +7,7 @@ use tetdb_base::storage::Pages;
 /// Flag bits that belong to the six edges.
 pub(super) const EDGE_FLAGS: u32 = 0x3F;
 
-/// Required edges found among the old tetrahedra, and what all of them share.
+/// Required edges of the old tetrahedra, and their common region and flags.
 #[derive(Default)]
 pub struct Inherited {
     region: u32,
@@ -41,7 +41,7 @@ impl Inherited {
         found
     }
 
-    /// Writes the attribute of a new tetrahedron where it differs from what is there.
+    /// Writes the attribute of a new tetrahedron if it differs from the present one.
     pub fn write<P: Pages>(&self, mesh: &mut Mesh<P>, t: u32, vertices: [u32; 4]) {
         let mut flags = self.flags;
         if !self.edges.is_empty() {

@@ -17,9 +17,9 @@ pub struct Ball {
     pub records: Vec<Tet>,
     /// Parallel to `tets`: local number of `v`.
     pub locals: Vec<u8>,
-    /// Whether no face at `v` is on the hull.
+    /// True if no face at `v` is on the hull.
     pub closed: bool,
-    /// Whether some face at `v` is required.
+    /// True if some face at `v` is required.
     pub required: bool,
     /// Open addressing over tetrahedra: the turn in the high half, the tetrahedron in the low one; places of other turns are empty.
     table: Vec<u64>,
@@ -123,7 +123,7 @@ impl Ball {
         u64::from(self.turn) << 32 | u64::from(t)
     }
 
-    /// Where `t` is in the table, or would be.
+    /// Slot of `t` in the table, used or empty.
     #[inline]
     fn place(&self, t: u32) -> usize {
         let (mask, entry) = (self.table.len() - 1, self.entry(t));

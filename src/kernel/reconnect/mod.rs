@@ -1,17 +1,14 @@
-//! Local changes of connection: faces and edges swapped for others inside a small fixed polyhedron.
+//! Local reconnection: faces and edges are swapped for others inside a small fixed polyhedron.
 //!
-//! Gather first (may load pages), then decide on copies, then apply. What is gathered: the [`Shell`] of an
-//! edge, the [`Ball`] of a vertex, the two tetrahedra of a face ([`FaceSwap`]). What decides: exact signs of
-//! the new tetrahedra and a quality the caller gives. What applies: [`remove_edge`], [`FaceSwap::apply`],
-//! [`Replacement::apply`].
+//! Gather first (may load pages), then decide on copies, then apply. Gathered are the [`Shell`] of an edge, the
+//! [`Ball`] of a vertex, the two tetrahedra of a face ([`FaceSwap`]). Decisions rest on exact signs of the new
+//! tetrahedra and on a quality from the caller. [`remove_edge`], [`FaceSwap::apply`] and [`Replacement::apply`] apply.
 //!
-//! What every operation keeps: neighbors are mutual; required bits stay on the outer faces; required-edge
-//! flags follow their edges; the new tetrahedra inherit region and the other flags; `tet_of` of every
-//! vertex involved names a new tetrahedron; ids are used again in the order gathered, so the result depends on
-//! the call alone. No operation changes a required face; a required edge is
-//! seen by [`Shell::required`] through a required face that has it and by [`Shell::edge_is_required`] through its
-//! flag. [`remove_edge`] asserts the first. The second costs the attribute page, so only callers that work
-//! while edges are required without faces (boundary recovery) need to ask.
+//! Invariants of every operation: neighbors are mutual; required bits stay on the outer faces; required-edge flags
+//! follow their edges; the new tetrahedra inherit region and the other flags; `tet_of` of every vertex involved names a
+//! new tetrahedron; ids are used again in the order gathered, so the result depends on the call alone. No operation
+//! changes a required face. A required edge shows in [`Shell::required`] if a required face has it, which [`remove_edge`]
+//! asserts; an edge that is required without faces has a flag in the attribute of its tetrahedra.
 
 mod attribute;
 mod ball;

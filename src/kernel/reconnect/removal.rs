@@ -10,8 +10,9 @@ use tetdb_base::storage::Pages;
 
 /// Replaces the closed `shell` by the tetrahedra of `triangulation`, listed in `new_tets`: first those with b, then those with a.
 ///
-/// Requires a shell as it is in the mesh now, no required face in it, and triangles whose cones are exactly positive.
-/// Effects: ids of the shell are used again in its order, one is freed for a ring of three; see the room for what is kept.
+/// Requires the current shell of the mesh, no required face in it, and triangles whose cones are exactly positive.
+/// Effects: ids of the shell are used again in its order, one is freed for a ring of three; the module's docs list the
+/// invariants.
 pub fn remove_edge<P: Pages>(
     mesh: &mut Mesh<P>,
     shell: &Shell,
@@ -51,12 +52,12 @@ pub fn remove_edge<P: Pages>(
             // The lower tetrahedron (i l j a) has the faces of l i and i j the other way around.
             let face_low = (3 - face) % 3;
             match edge {
-                Side::Triangle(other, other_face) => {
+                RingSide::Triangle(other, other_face) => {
                     upper.neighbor[face] = FaceRef::new(new_tets[other], other_face);
                     let other_low = (3 - other_face) % 3;
                     lower.neighbor[face_low] = FaceRef::new(new_tets[n_new + other], other_low);
                 }
-                Side::Outer(m) => {
+                RingSide::Outer(m) => {
                     let (record, [a, b, ..]) = (&shell.records[m], shell.locals[m]);
                     outer(mesh, record, a.into(), &mut upper, face, up);
                     outer(mesh, record, b.into(), &mut lower, face_low, low);
@@ -75,17 +76,17 @@ pub fn remove_edge<P: Pages>(
     mesh.set_tet_of(shell.a, new_tets[n_new]);
 }
 
-/// What is on the other side of a directed edge of a ring triangle.
-enum Side {
+/// The other side of a directed edge of a ring triangle.
+enum RingSide {
     /// Tetrahedron of the shell whose outer faces these are.
     Outer(usize),
     /// Another triangle, and the number of its upper face there.
     Triangle(usize, usize),
 }
 
-fn side(shell: &Shell, triangles: &[[u8; 3]], x: usize, y: usize) -> Side {
+fn side(shell: &Shell, triangles: &[[u8; 3]], x: usize, y: usize) -> RingSide {
     if (x + 1) % shell.n_ring() == y {
-        return Side::Outer(x);
+        return RingSide::Outer(x);
     }
     let found = triangles.iter().enumerate().find_map(|(k, t)| {
         let [i, j, l] = t.map(usize::from);
@@ -94,7 +95,7 @@ fn side(shell: &Shell, triangles: &[[u8; 3]], x: usize, y: usize) -> Side {
     });
     let (k, face) =
         found.unwrap_or_else(|| panic!("ring of {:?}: chord {x} {y} has one triangle", shell.ring));
-    Side::Triangle(k, face)
+    RingSide::Triangle(k, face)
 }
 
 /// Puts the outer face `old` of a shell tetrahedron on face `face` of the new one.

@@ -1,4 +1,4 @@
-//! Any set of tetrahedra replaced by any other that fills the same polyhedron.
+//! Replaces a set of tetrahedra by another that fills the same polyhedron.
 //!
 //! Slower than the flips with drawings of their own (faces are matched by sorting), and general: collapses
 //! and small-cavity searches end here.
@@ -13,7 +13,7 @@ use tetdb_base::storage::Pages;
 pub struct Replacement {
     /// Sorted vertices of a face, then which: below `OLD` a new tetrahedron's, else an outer face of the old ones.
     faces: Vec<([u32; 3], u32)>,
-    /// Outer faces: what is beyond, and the required bit.
+    /// Outer faces: the face beyond, and the required bit.
     outer: Vec<(FaceRef, u32)>,
     /// Indices of the tetrahedra created by the last replacement.
     pub new_tets: Vec<u32>,
@@ -24,8 +24,9 @@ const OLD: u32 = 1 << 31;
 impl Replacement {
     /// Replaces the tetrahedra `old` (ids and records as they are in the mesh now) by those with the vertices `new`.
     ///
-    /// `false`, with nothing changed, when the outer faces differ or an inner face of `old` is required. The caller has made
-    /// sure that `new` are exactly positive. A vertex that only `old` has keeps a dangling `tet_of`; it is the caller's to free.
+    /// `false`, with nothing changed, if the outer faces differ or an inner face of `old` is required. The caller
+    /// guarantees that `new` are exactly positive. A vertex that only `old` has keeps a dangling `tet_of`; the caller
+    /// must free it.
     pub fn apply<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,

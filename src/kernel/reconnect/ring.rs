@@ -6,7 +6,7 @@
 //! Source: G. T. Klincsek, "Minimal triangulations of polygonal domains" (1980); its use for edge removal:
 //! L. A. Freitag and C. Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and smoothing" (1997).
 
-/// What a triangulation must have.
+/// Requirement on a triangulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Forced {
     /// Any triangulation will do.
@@ -18,7 +18,7 @@ pub enum Forced {
 }
 
 impl Forced {
-    /// Whether the chord `i j` may occur: it may not cross what is forced.
+    /// Returns whether the chord `i j` may occur: it must not cross forced chords.
     fn allows(self, i: usize, j: usize) -> bool {
         let crosses = |p: usize, q: usize| {
             let inside = |x: usize| p.min(q) < x && x < p.max(q);
@@ -50,9 +50,9 @@ pub struct RingTriangulation {
 impl RingTriangulation {
     /// Finds the triangulation of a ring of `n` (3..=255) whose least `cone(i, j, k)` is largest and above `floor`.
     ///
-    /// `cone` is asked with i < j < k, at most once per triangle, and only for triangles that could still count; it must
-    /// return `f64::NEG_INFINITY` unless both its tetrahedra, `i j k b` and `a i j k`, are exactly positive. `false` when there is none
-    /// above `floor`. Ties go to the smallest positions.
+    /// `cone` is called with i < j < k, at most once per triangle, and only for triangles that could still count. It
+    /// must return `f64::NEG_INFINITY` unless both its tetrahedra, `i j k b` and `a i j k`, are exactly positive.
+    /// `false` if there is none above `floor`. Ties go to the smallest positions.
     pub fn solve(
         &mut self,
         n: usize,
@@ -75,7 +75,7 @@ impl RingTriangulation {
         self.solve_by(n, floor, Forced::Nothing, 0.0, |a, b| a + b, cone)
     }
 
-    /// The triangulation of largest value above `floor`, where `join` makes one value of two and leaves what it joins with `nothing`.
+    /// The triangulation of largest value above `floor`. `join` combines two values; `nothing` is its neutral element.
     #[inline(always)]
     fn solve_by(
         &mut self,

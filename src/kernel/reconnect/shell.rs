@@ -1,6 +1,5 @@
 //! All tetrahedra around an edge.
 
-use super::attribute::EDGE_FLAGS;
 use crate::mesh::anatomy::EDGES;
 use crate::mesh::{Mesh, Tet};
 use tetdb_base::geom::Point;
@@ -39,9 +38,9 @@ pub struct Shell {
     pub locals: Vec<[u8; 4]>,
     /// Ids of the vertices around the edge, in order.
     pub ring: Vec<u32>,
-    /// Whether the tetrahedra go all the way around.
+    /// True if the tetrahedra go all the way around.
     pub closed: bool,
-    /// Whether some face a b `ring[i]` is required.
+    /// True if some face a b `ring[i]` is required.
     pub required: bool,
 }
 
@@ -61,7 +60,7 @@ impl Shell {
         self.gather_from(mesh, t, &record, e, tets_max)
     }
 
-    /// [`Shell::gather`] for a caller who already has the record of `t`.
+    /// [`Shell::gather`] for a caller with the record of `t`.
     pub fn gather_from<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -154,13 +153,6 @@ impl Shell {
     #[inline]
     pub fn n_ring(&self) -> usize {
         self.ring.len()
-    }
-
-    /// Whether the edge itself is flagged as required; reads one attribute.
-    pub fn edge_is_required<P: Pages>(&self, mesh: &mut Mesh<P>) -> bool {
-        let (_, flags) = mesh.tet_attribute(self.tets[0]);
-        let [i, j, ..] = self.locals[0];
-        flags & EDGE_FLAGS & 1 << crate::mesh::anatomy::EDGE_OF[usize::from(i)][usize::from(j)] != 0
     }
 
     /// Positions of a, b and of the ring's vertices (in `ring_points`).

@@ -36,7 +36,7 @@ impl FaceSwap {
         Self::gather_from(mesh, face, &record)
     }
 
-    /// [`FaceSwap::gather`] for a caller who already has the record of the face's tetrahedron.
+    /// [`FaceSwap::gather`] for a caller with the record of the face's tetrahedron.
     #[inline]
     pub fn gather_from<P: Pages>(mesh: &mut Mesh<P>, face: FaceRef, record: &Tet) -> Option<Self> {
         let i = face.face();
@@ -61,13 +61,13 @@ impl FaceSwap {
         (mesh.point(self.p), mesh.point(self.q), face)
     }
 
-    /// Whether the three new tetrahedra are exactly positive: p q passes through the inside of the face.
+    /// Returns whether the three new tetrahedra are exactly positive: p q passes through the inside of the face.
     #[inline]
     pub fn is_positive(p: Point, q: Point, [x, y, z]: [Point; 3]) -> bool {
         orient(p, q, x, y) > 0.0 && orient(p, q, y, z) > 0.0 && orient(p, q, z, x) > 0.0
     }
 
-    /// Makes the change; returns the new tetrahedra `(p q x y) (p q y z) (p q z x)`.
+    /// Applies the swap; returns the new tetrahedra `(p q x y) (p q y z) (p q z x)`.
     ///
     /// Requires [`FaceSwap::is_positive`] and the two records as they are in the mesh now.
     pub fn apply<P: Pages>(&self, mesh: &mut Mesh<P>) -> [u32; 3] {

@@ -5,7 +5,7 @@ use super::field::Field;
 use super::recent::refuses;
 use super::report::RefineReport;
 use super::worker::Worker;
-use crate::delaunay::{Located, Rejected};
+use crate::delaunay::{PointLocation, Rejected};
 use crate::mesh::Mesh;
 use crate::mesh::anatomy::FROZEN;
 use tetdb_base::geom::Point;
@@ -100,7 +100,7 @@ impl Worker {
         mesh: &mut Mesh<P>,
         c: &Candidate,
         hint: u32,
-    ) -> Result<Located, Rejected> {
+    ) -> Result<PointLocation, Rejected> {
         self.kernel
             .locate(mesh, c.point, hint)
             .or_else(|_| self.kernel.locate(mesh, c.point, c.tet))

@@ -2,7 +2,7 @@ use super::*;
 use crate::delaunay::enclose;
 use crate::mesh::anatomy::MARK;
 use crate::mesh::anatomy::mark::EXAMINED;
-use crate::mesh::{FaceRef, Facet, VertexTag};
+use crate::mesh::{FaceRef, MeshFacet, VertexTag};
 use tetdb_base::geom::orient;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Backing, Pager, kind};
@@ -72,7 +72,7 @@ pub(super) fn wall_in(mesh: &mut Mesh<Pager>) {
         for i in 0..4 {
             if !tet.neighbor[i].exists() {
                 mesh.set_required(FaceRef::new(t, i), true);
-                mesh.add_facet(Facet {
+                mesh.add_facet(MeshFacet {
                     vertices: tet.face(i),
                     label: 0,
                     input: 0,
@@ -143,7 +143,7 @@ fn the_same_points_whatever_the_pool() {
         subdomain: 0,
         generation: 1,
         spill: dir.path().into(),
-        made: None,
+        output: None,
         base: None,
         cache_bytes: 1 << 20,
     };

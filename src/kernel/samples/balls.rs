@@ -13,7 +13,7 @@ use tetdb_base::geom::{Aabb, Point};
 const RADIUS_LOW: f64 = 0.015;
 const RADIUS_HIGH: f64 = 0.08;
 const GAP: f64 = 0.006;
-/// Edge length for a thousand balls when none is asked for: 0.5 M triangles, 48 k for a hundred.
+/// Default edge length for a thousand balls: 0.5 M triangles, 48 k for a hundred.
 const H_DEFAULT: f64 = 0.011;
 /// A few balls would be larger than the cube they are put in.
 const RADIUS_MAX: f64 = 0.4;
@@ -28,7 +28,7 @@ const DRAWS_FULL: u32 = 3;
 const DRAWS_MAX: u32 = 30;
 const SHRINK: f64 = 0.95;
 
-/// What `balls,count=…,seed=…,h=…` asks for.
+/// Parameters of `balls,count=…,seed=…,h=…`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Balls {
     pub count: usize,
@@ -48,7 +48,7 @@ impl Balls {
         H_DEFAULT * Self::scale(count)
     }
 
-    /// Makes the surface: labels `walls` and `balls`.
+    /// Builds the surface: labels `walls` and `balls`.
     pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let mut random = Random::new(self.seed);
         let placed = self.place(&mut random)?;
@@ -78,7 +78,7 @@ impl Balls {
                 shrink *= SHRINK;
             }
             let radii = self.radii(shrink, random);
-            result = Packing::of(&radii, GAP * Self::scale(self.count), random);
+            result = BallPacking::place(&radii, GAP * Self::scale(self.count), random);
             if result.is_ok() {
                 break;
             }
@@ -107,7 +107,7 @@ impl Balls {
 }
 
 /// Balls being put at random places of the unit cube.
-struct Packing {
+struct BallPacking {
     placed: Vec<(Point, f64)>,
     gap: f64,
     /// Cells along an axis of a grid whose cells are wider than any two neighbors' distance.
@@ -116,9 +116,13 @@ struct Packing {
     cells: Vec<Vec<(u32, Point, f64)>>,
 }
 
-impl Packing {
+impl BallPacking {
     /// Places balls of the radii given, largest first; on failure the number placed and the radius.
-    fn of(radii: &[f64], gap: f64, random: &mut Random) -> Result<Vec<(Point, f64)>, (usize, f64)> {
+    fn place(
+        radii: &[f64],
+        gap: f64,
+        random: &mut Random,
+    ) -> Result<Vec<(Point, f64)>, (usize, f64)> {
         let largest = radii.first().copied().unwrap_or(0.5);
         let n = ((1.0 / (2.0 * largest + gap)) as usize).clamp(1, 256);
         let mut packing = Self {
@@ -183,9 +187,9 @@ impl Packing {
         (z * self.n + y) * self.n + x
     }
 
-    /// Whether a ball there keeps the gap to all others but itself.
+    /// Returns whether a ball there keeps the gap to all others but itself.
     fn is_free(&self, ball: u32, center: Point, radius: f64) -> bool {
-        // Asked millions of times, and refused most of them, by a ball of the same cell most often.
+        // Called millions of times and usually refused, most often by a ball of the same cell.
         let [x, y, z] = self.coordinates(center);
         let cell_is_free = |cell: usize| {
             for &(other, at, r) in &self.cells[cell] {

@@ -43,8 +43,8 @@ pub(super) fn push_box(build: &mut Builder, bounds: &Aabb, h: f64, inward: bool,
     let n = (bounds.high - bounds.low).to_array().map(|side| steps(side, h) as u32);
     for axis in 0..3 {
         for high in [false, true] {
-            let face = Face { bounds, n, axis, high };
-            let rows: Vec<Vec<Corner>> =
+            let face = BoxFace { bounds, n, axis, high };
+            let rows: Vec<Vec<BoxCorner>> =
                 (0..=face.rows()).map(|row| face.row(build, row)).collect();
             let label = labels[2 * axis + usize::from(high)];
             for pair in rows.windows(2) {
@@ -56,7 +56,7 @@ pub(super) fn push_box(build: &mut Builder, bounds: &Aabb, h: f64, inward: bool,
 }
 
 /// One face of a box: rows along axis `axis + 1`, stacked along `axis + 2`.
-struct Face<'a> {
+struct BoxFace<'a> {
     bounds: &'a Aabb,
     n: [u32; 3],
     axis: usize,
@@ -65,17 +65,17 @@ struct Face<'a> {
 
 /// A point of a row: its place along the row in steps, and its id.
 #[derive(Clone, Copy)]
-struct Corner {
+struct BoxCorner {
     at: f64,
     id: u32,
 }
 
-impl Face<'_> {
+impl BoxFace<'_> {
     fn rows(&self) -> u32 {
         self.n[(self.axis + 2) % 3]
     }
 
-    fn row(&self, build: &mut Builder, row: u32) -> Vec<Corner> {
+    fn row(&self, build: &mut Builder, row: u32) -> Vec<BoxCorner> {
         let n = self.n[(self.axis + 1) % 3];
         let shifted = row % 2 == 1 && row != self.rows();
         let inner = if shifted { n } else { n - 1 };
@@ -90,7 +90,7 @@ impl Face<'_> {
             let p = self.place(at, f64::from(row));
             let on_seam = i == 0 || i > inner || row == 0 || row == self.rows();
             let id = if on_seam { build.seam_point(p) } else { build.point(p) };
-            corners.push(Corner { at, id });
+            corners.push(BoxCorner { at, id });
         }
         corners
     }
@@ -112,7 +112,7 @@ impl Face<'_> {
 
 /// Place of the `i`-th inner point of a shifted row of `n` steps.
 fn shifted_place(i: u32, n: u32) -> f64 {
-    /// How far the first points move away from the side; both are tuned by eye on edge lengths.
+    /// Distances by which the first points move away from the side; both are tuned by eye on edge lengths.
     const MOVES: [f64; 2] = [0.12, 0.04];
     let middle = f64::from(i) + 0.5;
     if n < 4 {
@@ -124,7 +124,7 @@ fn shifted_place(i: u32, n: u32) -> f64 {
 }
 
 /// Triangles between two rows of one face, each time along the shorter diagonal.
-fn stitch(build: &mut Builder, lower: &[Corner], upper: &[Corner], inward: bool, label: u32) {
+fn stitch(build: &mut Builder, lower: &[BoxCorner], upper: &[BoxCorner], inward: bool, label: u32) {
     let (mut i, mut j) = (0, 0);
     while i + 1 < lower.len() || j + 1 < upper.len() {
         let step_lower = match (lower.get(i + 1), upper.get(j + 1)) {

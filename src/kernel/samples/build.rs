@@ -1,11 +1,11 @@
-//! Collecting points and triangles, welding the points that two patches share.
+//! Collects points and triangles, and welds the points that two patches share.
 
 use super::{Sample, SampleError};
 use std::collections::HashMap;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{filled, push, reserve};
 
-/// A surface being made.
+/// A surface under construction.
 #[derive(Default)]
 pub(super) struct Builder {
     sample: Sample,
@@ -15,21 +15,21 @@ pub(super) struct Builder {
 
 impl Builder {
     /// A new label; returns its number.
-    pub(super) fn label(&mut self, name: impl Into<String>) -> u32 {
+    pub fn label(&mut self, name: impl Into<String>) -> u32 {
         self.sample.label_names.push(name.into());
         (self.sample.label_names.len() - 1) as u32
     }
 
-    /// A new point; the caller knows that it is not there yet.
-    pub(super) fn point(&mut self, p: Point) -> u32 {
+    /// A new point, which must not exist yet.
+    pub fn point(&mut self, p: Point) -> u32 {
         // Adding zero turns -0.0 into 0.0.
         push(&mut self.sample.points, p + Point::ZERO);
-        // Makers refuse surfaces of more triangles than u32 can number before they begin.
+        // Generators refuse surfaces of more triangles than u32 can number before they begin.
         (self.sample.points.len() - 1) as u32
     }
 
-    /// The point on a seam with these very coordinates, made when it is not there yet.
-    pub(super) fn seam_point(&mut self, p: Point) -> u32 {
+    /// The point on a seam with exactly these coordinates, added if new.
+    pub fn seam_point(&mut self, p: Point) -> u32 {
         let key = (p + Point::ZERO).to_array().map(f64::to_bits);
         if let Some(&id) = self.seam.get(&key) {
             return id;
@@ -40,42 +40,42 @@ impl Builder {
     }
 
     /// A triangle, turned over when `inward`.
-    pub(super) fn triangle(&mut self, [a, b, c]: [u32; 3], inward: bool, label: u32) {
+    pub fn triangle(&mut self, [a, b, c]: [u32; 3], inward: bool, label: u32) {
         let corners = if inward { [a, c, b] } else { [a, b, c] };
         push(&mut self.sample.triangles, corners);
         push(&mut self.sample.labels, label);
     }
 
     /// An edge inside.
-    pub(super) fn edge(&mut self, [a, b]: [u32; 2], label: u32) {
+    pub fn edge(&mut self, [a, b]: [u32; 2], label: u32) {
         push(&mut self.sample.edges, [a, b, label]);
     }
 
     /// A vertex that is a point inside.
-    pub(super) fn mark(&mut self, v: u32, label: u32) {
+    pub fn mark(&mut self, v: u32, label: u32) {
         push(&mut self.sample.marks, [v, label]);
     }
 
     /// Triangles so far.
-    pub(super) fn n_triangles(&self) -> usize {
+    pub fn n_triangles(&self) -> usize {
         self.sample.triangles.len()
     }
 
     /// [`Builder::finish`]; the triangles from `first` on are sheets.
-    pub(super) fn finish_with_sheets(mut self, first: usize) -> Sample {
+    pub fn finish_with_sheets(mut self, first: usize) -> Sample {
         let n = self.sample.triangles.len();
         self.sample.sheets = (0..n).map(|t| t >= first).collect();
         self.finish()
     }
 
     /// Ends a patch: later patches share no point with it.
-    pub(super) fn close_seams(&mut self) {
+    pub fn close_seams(&mut self) {
         self.seam.clear();
     }
 
     /// The surface, points numbered in the order in which triangles first name them: as reading a
     /// file of it would.
-    pub(super) fn finish(mut self) -> Sample {
+    pub fn finish(mut self) -> Sample {
         const UNNAMED: u32 = u32::MAX;
         let mut old2new = filled(self.sample.points.len(), UNNAMED);
         let mut points = Vec::new();
@@ -97,7 +97,7 @@ impl Builder {
     }
 }
 
-/// Refuses a surface too large to be made in memory.
+/// Refuses a surface too large to build in memory.
 pub(super) fn triangles_checked(
     name: &'static str,
     n_triangles: f64,
@@ -115,5 +115,6 @@ pub(super) fn triangles_checked(
 
 /// Above this a sample is refused.
 const TRIANGLES_MAX: u64 = 100_000_000;
-/// Bytes held for a triangle while a sample is made: half a point and another half while points are numbered, corners, a label, growth.
+/// Bytes per triangle while a sample is built: half a point and another half while points are numbered, corners, a
+/// label, growth.
 const BYTES_TRIANGLE: u64 = 50;

@@ -1,4 +1,4 @@
-//! A round column whose flat ends have many corners and are cut into triangles without a thought.
+//! A round column whose flat ends have many corners and a bad triangulation.
 //!
 //! Corners lie on a circle, far and near by turns; ears are cut off in an order drawn for each end. Four corners of such an end often bound a
 //! needle, and all of them lie in one plane.

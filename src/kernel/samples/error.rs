@@ -1,10 +1,10 @@
-//! What can be wrong with the name of a sample.
+//! Errors in the name of a sample.
 
 use std::fmt;
 
 use tetdb_base::geom::short;
 
-/// Why a sample cannot be made. Each message names the offending word and what would do.
+/// The reason why a sample cannot be built. Each message names the offending word and the valid ones.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SampleError {
     /// There is no sample of this name.
@@ -86,7 +86,7 @@ pub enum SampleError {
     NoRoom {
         /// Number of the ball, from 1.
         placed: usize,
-        /// Balls asked for.
+        /// Balls requested.
         count: usize,
         /// Radius of a ball.
         radius: f64,

@@ -80,7 +80,7 @@ pub(super) struct Grid {
 
 impl Grid {
     /// The sides of the box, with a label of their own.
-    pub(super) fn shell(&self, build: &mut Builder) {
+    pub fn shell(&self, build: &mut Builder) {
         let shell = build.label("box");
         for axis in 0..3 {
             for at in [0, self.cells] {
@@ -91,13 +91,7 @@ impl Grid {
         }
     }
 
-    pub(super) fn push(
-        &self,
-        build: &mut Builder,
-        (axis, low): CellSide,
-        inward: bool,
-        label: u32,
-    ) {
+    pub fn push(&self, build: &mut Builder, (axis, low): CellSide, inward: bool, label: u32) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let [a, b, c, d] = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[du, dv]| {
             let mut at = low;
@@ -116,7 +110,7 @@ impl Grid {
     }
 
     /// A point of the grid; those on the box are where they are.
-    pub(super) fn point(&self, at: [u32; 3]) -> Point {
+    pub fn point(&self, at: [u32; 3]) -> Point {
         let n = self.cells;
         let whole = Point::from_array(at.map(f64::from));
         if at.iter().any(|&i| i == 0 || i == n) {

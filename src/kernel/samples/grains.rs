@@ -1,7 +1,7 @@
 //! A unit cube full of disjoint convex polyhedral grains: the paper's case 6.
 //!
-//! The cube is divided at random, again and again, until each box has one grain: so sizes and shapes vary, no grain meets another,
-//! and each is made without looking at the rest. A grain is the hull of points on an ellipsoid turned at random.
+//! The cube is divided at random, again and again, until each box has one grain. So sizes and shapes vary, no grain
+//! meets another, and each is built independently. A grain is the hull of points on an ellipsoid turned at random.
 
 use super::SampleError;
 use super::boxes::{box_triangles, push_box};
@@ -20,12 +20,12 @@ const AXIS_LEAST: f64 = 0.5;
 /// Least distance of two points on the unit sphere. An axis shortens it to half of that at most: an edge is never shorter than 0.075
 /// of its grain's longest diameter.
 const APART: f64 = 0.3;
-/// What a grain leaves of its box, so that grains do not touch.
+/// Margin of a grain in its box, so that grains do not touch.
 const REACH: f64 = 0.92;
 /// Edges of the walls, by the mean distance of two grains.
 const WALL_EDGE: f64 = 0.3;
 
-/// What `grains,count=…,seed=…,h=…` asks for.
+/// Parameters of `grains,count=…,seed=…,h=…`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grains {
     pub count: usize,
@@ -90,7 +90,7 @@ fn push_grain(build: &mut Builder, room: &Aabb, random: &mut Random, label: u32)
     let mut axis = || AXIS_LEAST + (1.0 - AXIS_LEAST) * random.unit();
     let axes = [1.0, axis(), axis()];
     let columns = [0, 1, 2].map(|i| turn[i] * axes[i]);
-    // How far the ellipsoid reaches along each coordinate.
+    // Extent of the ellipsoid along each coordinate.
     let square = columns.iter().fold(Point::ZERO, |sum, &c| sum + c * c);
     let extent = Point::from(square.to_array().map(f64::sqrt));
     let half = (room.high - room.low) * (0.5 * REACH);
@@ -111,7 +111,7 @@ fn push_grain(build: &mut Builder, room: &Aabb, random: &mut Random, label: u32)
 /// Random points of the unit sphere, none nearer to another than [`APART`].
 fn apart_on_sphere(n: usize, random: &mut Random) -> Vec<Point> {
     let mut points: Vec<Point> = Vec::with_capacity(n);
-    // Forty-eight such caps cover a quarter of the sphere: there is always room.
+    // Forty-eight such caps cover a quarter of the sphere, so a free place always exists.
     while points.len() < n {
         let p = random.in_cube() * 2.0 - Point::ONE;
         let square = p.length_squared();

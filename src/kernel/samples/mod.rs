@@ -1,12 +1,11 @@
-//! Seeded makers of closed surfaces, the paper's cases among them, and kinds of what CAD programs write.
+//! Seeded generators of closed surfaces: the paper's cases, and typical output of CAD programs.
 //!
-//! A sample is named in one word without characters special to a shell, such as
-//! `balls,count=1000,seed=1,h=0.02`. The same word gives the same bits on every machine: only IEEE
-//! basic operations and square roots are used, and the random numbers are our own.
+//! A sample is named by one word without characters special to a shell, such as `balls,count=1000,seed=1,h=0.02`. The
+//! same word gives the same bits on every machine: only IEEE basic operations and square roots are used, and random
+//! numbers come from `random`.
 //!
-//! Every surface but for the sheets in it is closed, without duplicate points, and oriented so that normals point out of the
-//! parts that an odd number of shells separates from the outside: its signed volume is the volume
-//! that the parity rule fills.
+//! Every surface, except for its sheets, is closed and without duplicate points. Normals point out of the parts that an
+//! odd number of shells separates from the outside, so that the signed volume is the volume that the parity rule fills.
 
 mod balls;
 mod boxes;

@@ -1,4 +1,4 @@
-//! Three parts as CAD programs write them: a fan, slats and a perforated plate.
+//! Three typical parts from CAD programs: a fan, slats and a perforated plate.
 //!
 //! ```text
 //!    .--.         |||||       *---------*    A flat disk is a fan of triangles around one of its corners; a long
@@ -22,7 +22,7 @@ const QUARTER_MIN: usize = 2;
 const THICKNESS: f64 = 0.1;
 const LENGTH: f64 = 10.0;
 const RADIUS: f64 = 0.5;
-/// Where the parts stand along x: none is near another.
+/// Positions of the parts along x: none is near another.
 const PLACES: [f64; 3] = [0.0, 2.0, 4.0];
 
 /// `needles,count=64,holes=9,seed=1`: segments of each circle, a multiple of four, and holes of the plate.

@@ -1,4 +1,4 @@
-//! Flat polygons, cut into triangles by whoever asks, and the walls between two of them.
+//! Flat polygons, cut into triangles by their callers, and the walls between two of them.
 
 use std::collections::HashSet;
 
@@ -12,7 +12,8 @@ pub(super) struct Flat {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Where a prism stands: `at(u, v, w)` is the place of a polygon's `u`, `v` at the height `w`; `u`, `v` and `w` are right-handed.
+/// Frame of a prism: `at(u, v, w)` is the position of a polygon's `u`, `v` at the height `w`; `u`, `v` and `w` are
+/// right-handed.
 pub(super) struct Prism<'a> {
     pub at: &'a dyn Fn(f64, f64, f64) -> Point,
     /// Heights of the polygons at its lower and its upper end.

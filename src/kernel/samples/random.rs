@@ -9,7 +9,7 @@ pub(super) struct Random {
 }
 
 impl Random {
-    pub(super) fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         Self { state: seed }
     }
 
@@ -20,19 +20,19 @@ impl Random {
     }
 
     /// Uniform in `[0, 1[`, a multiple of 2^-53.
-    pub(super) fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
     /// Uniform in the unit cube.
-    pub(super) fn in_cube(&mut self) -> Point {
+    pub fn in_cube(&mut self) -> Point {
         let x = self.unit();
         let y = self.unit();
         Point::new(x, y, self.unit())
     }
 
     /// A uniformly random rotation, as its three columns.
-    pub(super) fn rotation(&mut self) -> [Point; 3] {
+    pub fn rotation(&mut self) -> [Point; 3] {
         loop {
             let q = [0; 4].map(|_| 2.0 * self.unit() - 1.0);
             let norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];

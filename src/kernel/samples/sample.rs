@@ -1,7 +1,7 @@
-//! The surface that a maker returns.
+//! The surface that a generator returns.
 
 use tetdb_base::geom::Point;
-use tetdb_base::surface::{Surface, Wires};
+use tetdb_base::surface::{Embedded, Surface};
 
 /// A closed labeled surface in memory.
 ///
@@ -18,7 +18,7 @@ pub struct Sample {
     pub labels: Vec<u32>,
     /// Names of the labels.
     pub label_names: Vec<String>,
-    /// Whether each triangle is part of a sheet in it; empty where none is.
+    /// True if each triangle is part of a sheet in it; empty where none is.
     pub sheets: Vec<bool>,
     /// The vertices of each edge inside, and its label.
     pub edges: Vec<[u32; 3]>,
@@ -27,7 +27,7 @@ pub struct Sample {
 }
 
 impl From<Sample> for Surface {
-    /// The same surface, from no file; what holds its edges is added by [`Surface::hold_wires`].
+    /// The surface of the sample, from no file; [`Surface::add_support_triangles`] completes its embedded edges.
     fn from(sample: Sample) -> Self {
         Self {
             points: sample.points,
@@ -35,7 +35,7 @@ impl From<Sample> for Surface {
             labels: sample.labels,
             label_names: sample.label_names,
             sheets: sample.sheets,
-            wires: Wires { edges: sample.edges, points: sample.marks, ..Wires::default() },
+            embedded: Embedded { edges: sample.edges, points: sample.marks, ..Embedded::default() },
             ..Self::default()
         }
     }

@@ -8,7 +8,7 @@ use super::sample::Sample;
 use super::sphere::{Ball, Spheres, sphere_pieces, sphere_triangles};
 use tetdb_base::geom::{Aabb, Point};
 
-/// Which bodies are nested.
+/// Shape of the nested bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShellKind {
     Spheres,

@@ -1,4 +1,4 @@
-//! From a word such as `balls,count=1000,h=0.02` to what it asks for.
+//! Parses a word such as `balls,count=1000,h=0.02`.
 
 use super::balls::Balls;
 use super::caps::Caps;
@@ -13,7 +13,7 @@ use std::fmt::Display;
 use std::str::FromStr;
 use tetdb_base::geom::Point;
 
-/// What a surface argument begins with when it names a sample.
+/// Prefix of a surface argument that names a sample.
 pub const PREFIX: &str = "sample:";
 /// The samples there are.
 pub const SAMPLES: &[&str] = &[
@@ -21,13 +21,13 @@ pub const SAMPLES: &[&str] = &[
     "wells",
 ];
 
-/// A sample that can be made.
+/// The specification of a sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampleSpec {
     kind: SampleKind,
 }
 
-/// The makers and what they are given; lengths in the sample's own units.
+/// The generators and their parameters; lengths in the sample's own units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SampleKind {
     /// Balls inside a box.
@@ -56,7 +56,7 @@ pub enum SampleKind {
     Needles(Needles),
     /// Surfaces within each other.
     Shells {
-        /// How many.
+        /// Number of shells.
         count: usize,
         /// Their shape.
         kind: ShellKind,
@@ -163,7 +163,7 @@ impl SampleSpec {
         self.make_within(u64::MAX)
     }
 
-    /// The same in no more than about `bytes_max` of memory.
+    /// [`SampleSpec::make`] within about `bytes_max` of memory.
     ///
     /// # Errors
     /// [`SampleError::Memory`] too, before anything large is allocated.
@@ -203,7 +203,7 @@ fn parse_box(rest: &str) -> Result<SampleKind, SampleError> {
 
 fn parse_caps(rest: &str) -> Result<SampleKind, SampleError> {
     let keys = Keys::new("caps", &["count", "seed"], rest)?;
-    // Of more corners neighbors would be too near to tell convex from flat.
+    // With more corners, neighbors would be too near to distinguish convex from flat.
     let count = keys.number("count", 60, 3, 20_000)?;
     let seed = keys.number("seed", 1, 0, u64::MAX)?;
     Ok(SampleKind::Caps(Caps { count, seed }))

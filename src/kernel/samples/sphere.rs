@@ -32,8 +32,7 @@ pub(super) fn make_sphere(radius: f64, h: f64, bytes_max: u64) -> Result<Sample,
     Ok(build.finish())
 }
 
-/// Pieces of each edge of the icosahedron, so that they are arcs of about `h`, or shorter where the
-/// curvature asks for it.
+/// Pieces of each edge of the icosahedron: arcs of about `h`, or shorter if the curvature requires it.
 pub(super) fn sphere_pieces(radius: f64, h: f64) -> f64 {
     (ICOSAHEDRON_ARC * radius / h + 0.5).floor().max(PIECES_MIN)
 }
@@ -45,26 +44,26 @@ pub(super) fn sphere_triangles(pieces: f64) -> f64 {
 
 /// A sphere's place and turn.
 pub(super) struct Ball {
-    pub(super) center: Point,
-    pub(super) radius: f64,
+    pub center: Point,
+    pub radius: f64,
     /// Columns of a rotation.
-    pub(super) turn: [Point; 3],
+    pub turn: [Point; 3],
 }
 
 impl Ball {
     /// Around the origin, not turned.
-    pub(super) fn unturned(radius: f64) -> Self {
+    pub fn unturned(radius: f64) -> Self {
         Self { center: Point::ZERO, radius, turn: [Point::X, Point::Y, Point::Z] }
     }
 
     /// Turned at random, so that many balls do not share directions.
-    pub(super) fn turned(center: Point, radius: f64, random: &mut Random) -> Self {
+    pub fn turned(center: Point, radius: f64, random: &mut Random) -> Self {
         let turn = random.rotation();
         Self { center, radius, turn }
     }
 }
 
-/// Unit spheres already made, by number of pieces.
+/// Unit spheres built so far, by number of pieces.
 #[derive(Default)]
 pub(super) struct Spheres {
     made: BTreeMap<u32, (Vec<Point>, Vec<[u32; 3]>)>,
@@ -72,14 +71,7 @@ pub(super) struct Spheres {
 
 impl Spheres {
     /// Adds the surface of `ball` with edges of about `h`.
-    pub(super) fn push(
-        &mut self,
-        build: &mut Builder,
-        ball: &Ball,
-        h: f64,
-        inward: bool,
-        label: u32,
-    ) {
+    pub fn push(&mut self, build: &mut Builder, ball: &Ball, h: f64, inward: bool, label: u32) {
         let pieces = sphere_pieces(ball.radius, h) as u32;
         let (points, triangles) = self.made.entry(pieces).or_insert_with(|| unit_sphere(pieces));
         let [x, y, z] = ball.turn;
@@ -121,7 +113,7 @@ fn unit_sphere(n: u32) -> (Vec<Point>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// Point ids of a face, row by row from its first corner; inner points are made here.
+/// Point ids of a face, row by row from its first corner; inner points are added here.
 fn face_rows(
     face: [u32; 3],
     n: u32,

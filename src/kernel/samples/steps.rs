@@ -1,4 +1,4 @@
-//! A slab with low steps, as rounded offsets leave them in parts from CAD programs.
+//! A slab with low steps, like those from rounded offsets in CAD parts.
 //!
 //! ```text
 //!          _______            Each column ends at a height of its own, a share `step` of the slab's length off its
@@ -63,7 +63,7 @@ fn side(widths: &[f64], heights: &[f64]) -> Flat {
     let mut left = chain(&mut flat, x, &heights[..1]);
     for (i, &width) in widths.iter().enumerate() {
         x += width;
-        // Where two columns meet the lower one's corner is on the higher one's side.
+        // Where two columns meet, the lower one's corner is on the higher one's side.
         let next = heights.get(i + 1).copied();
         let mut ends: Vec<f64> = [Some(heights[i]), next].into_iter().flatten().collect();
         ends.sort_unstable_by(f64::total_cmp);

@@ -1,8 +1,8 @@
 //! Closed, oriented, near the wanted edges, the same on every machine.
 
 mod divide;
-mod fins;
 mod sheets;
+mod support_triangles;
 
 use super::*;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -13,7 +13,7 @@ fn made(text: &str) -> Sample {
     SampleSpec::parse(text).unwrap().make().unwrap()
 }
 
-/// What a whole surface must satisfy; returns V − E + F.
+/// Requirements on a complete surface; returns V − E + F.
 fn check_closed(sample: &Sample) -> i64 {
     let mut edges: HashSet<(u32, u32)> = HashSet::new();
     let mut used = vec![false; sample.points.len()];
@@ -220,7 +220,7 @@ fn the_knot_is_one_ring() {
     assert!((sample.signed_volume() / exact - 1.0).abs() < 0.05, "{}", sample.signed_volume());
 }
 
-/// What meshing asks of a surface, and more: closed in exact signs, one volume or three.
+/// Requirements of meshing, and more: closed in exact signs, one volume or three.
 fn check_solid(text: &str, n_parts: i64) -> Sample {
     let sample = made(text);
     let genus = if text.contains("needles") { 9 } else { 0 };
@@ -304,7 +304,7 @@ fn surfaces_have_the_order_of_files() {
     assert_eq!(next as usize, surface.points.len());
 }
 
-/// Written down when the makers were made; they may never change.
+/// Recorded when the generators were written; they must never change.
 const EXPECTED: [u64; 6] = [
     0x4d86_8dcf_cc8b_164a,
     0x7aac_3221_1b6f_2f59,

@@ -15,7 +15,7 @@ pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     }
 }
 
-/// Taylor series, for `|x| <= pi/4`: the first term left out is below 1e-17.
+/// Taylor series, for `|x| <= pi/4`: the first omitted term is below 1e-17.
 fn series(x: f64) -> (f64, f64) {
     let (mut s, mut c) = (0.0, 0.0);
     let x2 = x * x;

@@ -1,4 +1,4 @@
-//! Sizes from a background mesh: linear in its tetrahedra, nothing wanted outside of it.
+//! Sizes from a background mesh: linear in its tetrahedra, none outside of it.
 
 use super::SizingError;
 use super::constraint::SizeConstraint;
@@ -37,12 +37,12 @@ pub struct BackgroundMesh {
 impl BackgroundMesh {
     /// Shape: `h` runs parallel to `points`, which `tets` index; sizes are above zero.
     pub fn new(points: Vec<Point>, tets: Vec<[u32; 4]>, h: Vec<f64>) -> Self {
-        let room = &ScratchSpace::boundless();
+        let scratch = &ScratchSpace::boundless();
         let bounds = Aabb::around(points.iter().copied());
         let around = |t: u32| Aabb::around(tets[t as usize].map(|v| points[v as usize]));
-        let tree = BoxTree::new(&bounds, tets.len() as u32, room, |_| true, around);
+        let tree = BoxTree::new(&bounds, tets.len() as u32, scratch, |_| true, around);
         let at = |v: u32| Aabb::around([points[v as usize]]);
-        let vertices = BoxTree::new(&bounds, points.len() as u32, room, |_| true, at);
+        let vertices = BoxTree::new(&bounds, points.len() as u32, scratch, |_| true, at);
         let join = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.min(c), b.max(d)];
         let mut ranges: Vec<Vec<[f64; 2]>> = Vec::new();
         for (level, nodes) in vertices.levels.iter().enumerate() {
@@ -124,7 +124,8 @@ impl SizeConstraint for BackgroundMesh {
         Ok(self.at(p).unwrap_or(f64::INFINITY))
     }
 
-    /// Linear pieces have their extremes at vertices: what is in the cell tells, besides its corners and middle.
+    /// Linear pieces have their extremes at vertices. So the vertices in the cell are examined besides its corners and
+    /// middle.
     fn divides(&self, middle: Point, width: f64) -> Option<bool> {
         let half = Point::splat(0.5 * width);
         let cell = Aabb { low: middle - half, high: middle + half };
@@ -147,7 +148,7 @@ impl SizeConstraint for BackgroundMesh {
         if !low.is_finite() || width <= CELLS_PER_SIZE * low {
             return Some(false);
         }
-        // Where the mesh ends the cell's outer corners tell nothing.
+        // At the end of the mesh the cell's outer corners have no sizes.
         if is_outside {
             return Some(true);
         }

@@ -1,4 +1,4 @@
-//! A size field as bytes, so that a store can keep it.
+//! A size field as bytes, for storing.
 //!
 //! | offset | bytes | content, little endian |
 //! |---|---|---|
@@ -12,9 +12,10 @@
 //! | 60 | 4 | zero |
 //! | 64 | … | zstd frame of C + L + 4 V bytes |
 //!
-//! In the frame: of each cell, depth first and octants in order, 1 for a leaf and 0 for one with children; of each leaf a byte whose bit
-//! `i` says that the value at corner `i` is new; the new values, f32. A value that is not new is that of the last leaf with this corner, as
-//! far as a table of [`REMEMBERED`] corners knows it: neighbors have corners in common, so that a leaf takes about 5 bytes instead of 37.
+//! In the frame: for each cell, depth first and octants in order, 1 for a leaf and 0 for one with children; for each
+//! leaf a byte whose bit `i` says that the value at corner `i` is new; the new values, f32. A value that is not new
+//! equals that of the last leaf with this corner, if a table of [`REMEMBERED`] corners still has it. Neighbors have
+//! corners in common, so that a leaf takes about 5 bytes instead of 37.
 
 use std::fmt::Display;
 use std::io::{Read, Write};
@@ -65,7 +66,7 @@ impl SizeField {
         for n in [n_cells, self.values.len() as u32, n_values, 0] {
             bytes.extend(n.to_le_bytes());
         }
-        // Three ways through the octree, so that only what is packed is held.
+        // Three passes through the octree, so that only packed data is held.
         let packed = (|| {
             let mut frame = zstd::Encoder::new(bytes, 1)?;
             for (number, _) in self.tree.cells() {
@@ -117,11 +118,12 @@ impl SizeField {
         Self::from_bytes_in(bytes, &ScratchSpace::boundless())
     }
 
-    /// Reads what [`SizeField::to_bytes`] wrote, checking all of it; values go to a scratch file where their share of `room` is too small.
+    /// Reads the output of [`SizeField::to_bytes`] and checks all of it. Values go to a scratch file if their share of
+    /// `scratch` is too small.
     ///
     /// # Errors
-    /// [`SizingError::Damaged`] names what is wrong. A scratch file that fails unwinds.
-    pub fn from_bytes_in(bytes: &[u8], room: &ScratchSpace) -> Result<Self, SizingError> {
+    /// [`SizingError::Damaged`] names the damage. A scratch file that fails unwinds.
+    pub fn from_bytes_in(bytes: &[u8], scratch: &ScratchSpace) -> Result<Self, SizingError> {
         if bytes.len() < HEADER_BYTES {
             return Err(damaged("length", bytes.len(), "at least 64"));
         }
@@ -141,7 +143,7 @@ impl SizeField {
         let [n_cells, n_leaves, n_values] = [0, 1, 2].map(count);
         let expected = n_cells + n_leaves + 4 * n_values;
         let mut body = Vec::new();
-        // Grows with what is there, not with what a damaged header promises.
+        // Grows with the data read, not with the number in a damaged header.
         let read = zstd::Decoder::with_buffer(&bytes[HEADER_BYTES..])
             .and_then(|frame| frame.take(expected as u64 + 1).read_to_end(&mut body));
         if read.is_err() || body.len() != expected {
@@ -149,7 +151,7 @@ impl SizeField {
         }
         let (cells, rest) = body.split_at(n_cells);
         let (news, values) = rest.split_at(n_leaves);
-        let leaves = room.list_within(Self::share_of(room.cap()));
+        let leaves = scratch.builder_within(Self::share_of(scratch.cap()));
         let (tree, values) = read_tree(cells, news, values, leaves)?;
         Ok(Self::from_parts(OctreeFrame { low, side }, beta, tree, values))
     }
@@ -212,14 +214,14 @@ fn read_tree(
     if !stack.is_empty() || leaves.len() != news.len() || values.next().is_some() {
         return Err(damaged("number of leaves", leaves.len(), news.len()));
     }
-    Ok((tree, leaves.done().fixed()))
+    Ok((tree, leaves.finish().freeze()))
 }
 
 fn damaged(what: &'static str, found: impl Display, expected: impl Display) -> SizingError {
     SizingError::Damaged { what, found: found.to_string(), expected: expected.to_string() }
 }
 
-/// The first bytes; the caller knows that they are there.
+/// The first bytes, which must exist.
 fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
     std::array::from_fn(|i| bytes[i])
 }

@@ -10,7 +10,7 @@ pub trait SizeConstraint: Sync {
     /// Errors: a value that is no size, and where.
     fn h(&self, p: Point) -> Result<f64, SizingError>;
 
-    /// Whether a cube must be divided for this wish; `None` when only its values tell.
+    /// Returns whether a cube must be divided for this constraint; `None` if only its values can decide.
     fn divides(&self, middle: Point, width: f64) -> Option<bool> {
         let _ = (middle, width);
         None

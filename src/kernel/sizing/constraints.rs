@@ -1,4 +1,4 @@
-//! Sizes wanted by position, brought into the octree once: it is divided where they change, and takes the least at its corners.
+//! Samples sizes given by position into the octree once: cells are divided where sizes change, corners take the least.
 //!
 //! ```text
 //!   +---+---+   27 places of a cell are asked: where what lies between the corners does not follow from
@@ -11,40 +11,40 @@
 use rayon::prelude::*;
 
 use super::SizingError;
-use super::bits::Bits;
 use super::constraint::SizeConstraint;
-use super::corners::Corners;
+use super::corners::TreeCorners;
 use super::seeds::OctreeFrame;
 use super::tree::{DEPTH, LATTICE, Leaf, Tree};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{SpillVec, parallel};
 
-/// Levels down to which every cell is asked.
+/// Levels down to which every cell is sampled.
 const LEVELS_ASKED: u32 = 5;
-/// Cells and corners asked about side by side.
+/// Cells sampled in one batch.
 const CELLS_AT_ONCE: usize = 1 << 16;
 /// Cells at most: as many leaves as can be numbered.
 const CELLS_MAX: usize = 1 << 28;
-/// Wishes between corners may be off what lies between their values by this share.
+/// Constraints between corners may differ from interpolated values by this share.
 pub(super) const BEND_MAX: f64 = 0.1;
 
-/// Wishes for one surface, in its box.
+/// Constraints for one surface, in its box.
 pub(super) struct SizeConstraints<'a> {
     pub list: &'a [&'a dyn SizeConstraint],
     pub frame: OctreeFrame,
     pub bounds: Aabb,
-    /// No wish goes below this, in units of the cube's side.
+    /// Lower bound of all constraints, in units of the cube's side.
     pub least: f64,
-    /// What lies between corners may be off what their values tell by this share.
+    /// Values between corners may differ from the interpolated ones by this share.
     pub bend_max: f64,
-    /// Cells are no wider than this many of the least wished lengths in them, where wishes bend.
+    /// Where a constraint is not linear, cells are no wider than this many of its least lengths in them.
     pub cells_per_size: f64,
     /// Cells are divided that far outside the box, in their own widths.
     pub beside: f64,
 }
 
 impl SizeConstraints<'_> {
-    /// The least wish at a lattice position in units of the cube's side. Outside the surface's box that of its nearest point.
+    /// The least constraint at a lattice position, in units of the cube's side. Outside the surface's box it is that of
+    /// the nearest point.
     fn h(&self, at: [u32; 3]) -> Result<f64, SizingError> {
         let mut least = f64::INFINITY;
         for constraint in self.list {
@@ -59,8 +59,8 @@ impl SizeConstraints<'_> {
         p.clamp(self.bounds.low, self.bounds.high)
     }
 
-    /// Divides leaves of `tree` where wishes ask for it.
-    pub(super) fn refine(&self, tree: &mut Tree) -> Result<(), SizingError> {
+    /// Divides leaves of `tree` where constraints require it.
+    pub fn refine(&self, tree: &mut Tree) -> Result<(), SizingError> {
         if self.list.is_empty() {
             return Ok(());
         }
@@ -88,7 +88,7 @@ impl SizeConstraints<'_> {
         Ok(())
     }
 
-    /// Which cells are divided in a cell, depth first.
+    /// Subdivision of a cell, depth first: true for divided cells.
     fn shape_of(&self, cell: Leaf) -> Result<Vec<bool>, SizingError> {
         if cell.level == DEPTH || !self.is_in_bounds(cell) {
             return Ok(vec![false]);
@@ -119,7 +119,7 @@ impl SizeConstraints<'_> {
         self.bounds.meets(&Aabb { low, high })
     }
 
-    /// Whether a cell is divided, and whether values were asked to tell.
+    /// Returns whether a cell is divided, and whether values were sampled to decide that.
     fn is_divided(&self, cell: Leaf) -> Result<(bool, bool), SizingError> {
         let half = cell.width() / 2;
         if half == 0 {
@@ -148,46 +148,23 @@ impl SizeConstraints<'_> {
         Ok((!is_fine && bends(&h, self.bend_max), true))
     }
 
-    /// Lowers values at the corners of leaves to what is wished there.
-    pub(super) fn lower(
+    /// Lowers values at the corners of leaves to the constraints there.
+    pub fn lower(
         &self,
         tree: &Tree,
-        corners: &mut Corners,
+        corners: &mut TreeCorners,
         h: &mut SpillVec<f32>,
     ) -> Result<(), SizingError> {
         if self.list.is_empty() {
             return Ok(());
         }
-        let mut is_known = Bits::new(corners.n_corners);
-        let mut places: Vec<(u32, [u32; 3])> = Vec::with_capacity(CELLS_AT_ONCE + 8);
-        for (i, leaf) in tree.leaves().enumerate() {
-            for (c, id) in corners.of_leaf.get(i).into_iter().enumerate() {
-                if !is_known.set(id) {
-                    places.push((id, leaf.corner(c)));
-                }
-            }
-            if places.len() >= CELLS_AT_ONCE {
-                self.lower_at(&mut places, h)?;
-            }
-        }
-        self.lower_at(&mut places, h)
-    }
-
-    fn lower_at(
-        &self,
-        places: &mut Vec<(u32, [u32; 3])>,
-        h: &mut SpillVec<f32>,
-    ) -> Result<(), SizingError> {
-        let constrained: Result<Vec<f64>, _> =
-            parallel(|| places.par_iter().map(|&(_, at)| self.h(at)).collect());
-        for ((id, _), constrained) in places.drain(..).zip(constrained?) {
-            h.change(id as usize, |h| *h = h.min(constrained as f32));
-        }
-        Ok(())
+        corners.sample(tree, &|at| self.h(at), |id, wanted| {
+            h.change(id, |h| *h = h.min(wanted as f32));
+        })
     }
 }
 
-/// Whether some of 27 values is far from the mean of the corners around it.
+/// Returns whether some of 27 values is far from the mean of the corners around it.
 fn bends(h: &[f64; 27], most: f64) -> bool {
     (0..27).any(|i| {
         let at = [i % 3, i / 3 % 3, i / 9];

@@ -1,4 +1,4 @@
-//! Corners of the octree's leaves, numbered once each, and those that hang.
+//! Corners of the octree's leaves, numbered once each, and hanging corners.
 //!
 //! ```text
 //!   p-------+---+      A corner in the middle of a larger leaf's edge or face hangs: its value
@@ -8,8 +8,17 @@
 //!   +-------q---+      at a corner that is free.
 //! ```
 
+use fixedbitset::FixedBitSet;
+use rayon::prelude::*;
+
+use super::SizingError;
 use super::tree::{LATTICE, Leaf, Tree};
-use tetdb_base::storage::{Keyed, ScratchSpace, SpillVec, StorageError, raise, sort_record};
+use tetdb_base::storage::{
+    KeyedId, OrRaise, ScratchSpace, SpillVec, StorageError, parallel, sort_record,
+};
+
+/// Corners sampled in one batch.
+const CORNERS_AT_ONCE: usize = 1 << 16;
 
 sort_record! {
     /// A hanging corner and the four corners (an edge's two, twice) whose mean it takes.
@@ -24,61 +33,92 @@ sort_record! {
 }
 
 impl Hanging {
-    /// Whether it is in the middle of an edge; else of a face.
+    /// Returns whether it is in the middle of an edge; else of a face.
     fn on_edge(&self) -> bool {
         self.on[0] == self.on[2]
     }
 
     /// The two or four corners, once each.
-    pub(super) fn distinct(&self) -> &[u32] {
+    pub fn distinct(&self) -> &[u32] {
         if self.on_edge() { &self.on[..2] } else { &self.on }
     }
 
     /// Distance to the corners it hangs on, in units of the root's side.
-    pub(super) fn distance(&self) -> f64 {
+    pub fn distance(&self) -> f64 {
         let side = 1.0 / f64::from(1u32 << self.level);
         if self.on_edge() { side } else { side * 2f64.sqrt() }
     }
 }
 
 /// Corners of a tree.
-pub(super) struct Corners {
+pub(super) struct TreeCorners {
     /// Corner numbers of each leaf, in the octants' order.
-    pub(super) of_leaf: SpillVec<[u32; 8]>,
-    pub(super) n_corners: usize,
+    pub of_leaf: SpillVec<[u32; 8]>,
+    pub n_corners: usize,
     /// Sorted by level, each corner once.
-    pub(super) hanging: SpillVec<Hanging>,
+    pub hanging: SpillVec<Hanging>,
 }
 
-impl Corners {
+impl TreeCorners {
     /// A disk that fails unwinds.
-    pub(super) fn of(tree: &Tree, room: &ScratchSpace) -> Self {
-        let numbered = number_corners(tree, room);
-        let (mut of_leaf, n_corners) = numbered.unwrap_or_else(|e| raise(e));
-        let hanging = find_hanging(tree, &mut of_leaf, room).unwrap_or_else(|e| raise(e));
+    pub fn new(tree: &Tree, scratch: &ScratchSpace) -> Self {
+        let numbered = number_corners(tree, scratch);
+        let (mut of_leaf, n_corners) = numbered.or_raise();
+        let hanging = find_hanging(tree, &mut of_leaf, scratch).or_raise();
         Self { of_leaf, n_corners, hanging }
+    }
+
+    /// Calls `size` once for the lattice position of each corner, on all threads, and `store` with the corner and its
+    /// size.
+    pub fn sample(
+        &mut self,
+        tree: &Tree,
+        size: &(dyn Fn([u32; 3]) -> Result<f64, SizingError> + Sync),
+        mut store: impl FnMut(usize, f64),
+    ) -> Result<(), SizingError> {
+        let mut is_sampled = FixedBitSet::with_capacity(self.n_corners);
+        let mut batch: Vec<(u32, [u32; 3])> = Vec::with_capacity(CORNERS_AT_ONCE + 8);
+        let mut sample_batch = |batch: &mut Vec<(u32, [u32; 3])>| {
+            let sizes: Result<Vec<f64>, _> =
+                parallel(|| batch.par_iter().map(|&(_, at)| size(at)).collect());
+            for ((id, _), size) in batch.drain(..).zip(sizes?) {
+                store(id as usize, size);
+            }
+            Ok(())
+        };
+        for (i, leaf) in tree.leaves().enumerate() {
+            for (c, id) in self.of_leaf.get(i).into_iter().enumerate() {
+                if !is_sampled.put(id as usize) {
+                    batch.push((id, leaf.corner(c)));
+                }
+            }
+            if batch.len() >= CORNERS_AT_ONCE {
+                sample_batch(&mut batch)?;
+            }
+        }
+        sample_batch(&mut batch)
     }
 }
 
 /// Numbers corners along the Morton curve, so that near corners are near in memory.
 fn number_corners(
     tree: &Tree,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> Result<(SpillVec<[u32; 8]>, usize), StorageError> {
-    let mut keys = room.sorter::<Keyed>();
+    let mut keys = scratch.sorter::<KeyedId>();
     let mut n_leaves = 0;
     for (i, leaf) in tree.leaves().enumerate() {
         n_leaves += 1;
         for c in 0..8 {
-            keys.push(Keyed { key: morton(leaf.corner(c)), id: (8 * i + c) as u32 })?;
+            keys.push(KeyedId { key: morton(leaf.corner(c)), id: (8 * i + c) as u32 })?;
         }
     }
     let keys = keys.finish()?;
-    let mut of_leaf = room.column(n_leaves, [0u32; 8]);
+    let mut of_leaf = scratch.vec(n_leaves, [0u32; 8]);
     let mut n_corners = 0u32;
     let mut last = None;
     for key in keys {
-        let Keyed { key: corner, id: slot } = key?;
+        let KeyedId { key: corner, id: slot } = key?;
         if last != Some(corner) {
             n_corners += 1;
             last = Some(corner);
@@ -106,9 +146,9 @@ fn morton(p: [u32; 3]) -> u64 {
 fn find_hanging(
     tree: &Tree,
     of_leaf: &mut SpillVec<[u32; 8]>,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> Result<SpillVec<Hanging>, StorageError> {
-    let mut found = room.sorter::<Hanging>();
+    let mut found = scratch.sorter::<Hanging>();
     for (i, leaf) in tree.leaves().enumerate() {
         let ids = of_leaf.get(i);
         for cell in leaf.outer_neighbors() {
@@ -123,7 +163,7 @@ fn find_hanging(
             }
         }
     }
-    let mut hanging = room.list();
+    let mut hanging = scratch.builder();
     let mut last = None;
     for next in found.finish()? {
         let next = next?;
@@ -132,7 +172,7 @@ fn find_hanging(
             last = Some(next.corner);
         }
     }
-    Ok(hanging.done())
+    Ok(hanging.finish())
 }
 
 /// The leaf at a neighboring cell, when it is larger.
@@ -143,7 +183,7 @@ fn larger_leaf(tree: &Tree, leaf: &Leaf, cell: [u32; 3]) -> Option<(Leaf, u32)> 
     (level < leaf.level).then_some((Leaf { anchor, level }, number))
 }
 
-/// How a corner of a leaf hangs on a leaf twice as large, if it does.
+/// The hanging corner of a leaf on a leaf twice as large, if it hangs.
 fn hangs(
     leaf: &Leaf,
     corner: usize,

@@ -1,7 +1,7 @@
-//! How many tetrahedra to expect, before there is one.
+//! Expected number of tetrahedra, before meshing.
 //!
-//! Away from the surface they follow the load. At it they follow its own triangles: where it is flat three tetrahedra stand on two
-//! triangles, in the edges of a thin rod two, and where needles lie the edges of what is above cross them.
+//! Away from the surface they follow the load. At the surface they follow its triangles: three tetrahedra stand on two
+//! triangles of a flat part, and two in the edges of a thin rod. The edges above needles cross them.
 
 use rayon::prelude::*;
 
@@ -12,10 +12,10 @@ use super::options::SizeOptions;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::parallel;
 
-/// How near to the surface vertices come. No vertex is inserted nearer than 0.25 h to a triangle or 0.71 h to a vertex, but those a
-/// little farther away take up the room as well. With 0.1 and 0.3 h from triangles thin plates of large triangles have a sixth more
-/// and a third fewer tetrahedra; with 0.5 and 0.6 h from vertices half of 42 surfaces are off by more than 3.4 and 4.5 %, and
-/// with 0.55 a thin knot of 1,700 tetrahedra by 16 %.
+/// Distance of new vertices from the surface. No vertex is inserted nearer than 0.25 h to a triangle or 0.71 h to a
+/// vertex, but vertices a little farther away leave that layer thinner. With 0.1 and 0.3 h from triangles thin plates
+/// of large triangles have a sixth more and a third fewer tetrahedra. With 0.5 and 0.6 h from vertices half of 42
+/// surfaces are off by more than 3.4 and 4.5 %, and with 0.55 a thin knot of 1,700 tetrahedra by 16 %.
 const SKIN: SurfaceSkin = SurfaceSkin { triangles: 0.2, vertices: 0.57 };
 /// Vertices per unit of load in the inside: 1.68 to 1.74 on balls, a box and three scans.
 const VERTICES_PER_LOAD: f64 = 1.69;
@@ -50,13 +50,13 @@ impl TetCounts {
 impl SizeField {
     /// Numbers of tetrahedra and vertices to expect in `domain`.
     ///
-    /// Measured on 28 surfaces: within 4 % for half of them, within 16 % for all but those of a thousand
-    /// tetrahedra and of thin needles alone, which may have a third more than is told.
+    /// Measured on 28 surfaces: within 4 % for half of them, within 16 % for all others except those of a thousand
+    /// tetrahedra and of thin needles alone, which may have a third more than predicted.
     pub fn counts(&self, domain: &Domain) -> TetCounts {
         let load = self.load(domain, SKIN);
         let inner_tets = TETS_PER_LOAD * load;
         let (sides, angles) = domain.sides_and_angles();
-        // Each vertex has as many inner edges as its solid angle has room for, and T = edges inside + vertices.
+        // The inner edges of a vertex are proportional to its solid angle, and T = edges inside + vertices.
         let flat = (2.0 / std::f64::consts::PI * angles - 1.5 * sides).max(0.5 * sides);
         // No more edges are crossed than there are tetrahedra to cross them.
         let crossed = (TETS_PER_CROSSING * self.needles(domain)).min(inner_tets);
@@ -67,7 +67,7 @@ impl SizeField {
         }
     }
 
-    /// Wanted lengths along the surface's edges beyond what an edge of ordinary length has, per filled side.
+    /// Wanted lengths along the surface's edges beyond an ordinary edge, per filled side.
     fn needles(&self, domain: &Domain) -> f64 {
         let surface = domain.seeker.surface();
         let h: Vec<f64> = parallel(|| surface.points.par_iter().map(|&p| self.h(p)).collect());
@@ -119,7 +119,7 @@ impl Domain<'_> {
         sides.iter().map(|&v| u32::from(self.filled[v as usize])).sum()
     }
 
-    /// What is filled, told from the triangles around it.
+    /// The filled volume, computed from the triangles around it.
     pub(super) fn volume(&self) -> f64 {
         let surface = self.seeker.surface();
         let Some(&origin) = surface.points.first() else {

@@ -8,10 +8,11 @@ use tetdb_base::storage::{FrozenSpillVec, ScratchSpace, SpillVecBuilder};
 /// An edge gets seeds when it is longer than this many of its ends' sizes. Edges of even surfaces are shorter, and their meshes stay the same;
 /// other values were not tried.
 const LONG_FROM: f64 = 2.0;
-/// Seeds from one end of an edge to its middle at most, beside the one there. At the steepest slope sizes grow 1.7 times from one to the
-/// next: sixteen reach 5,000 times the end's size, what is beyond is left to the averages between.
+/// Seeds from one end of an edge to its middle at most, besides the seed there. At the steepest slope sizes grow 1.7
+/// times from one to the next: sixteen reach 5,000 times the end's size. Beyond that, the averages between fill in.
 const STEPS_MAX: u32 = 16;
-/// So many seeds are kept whatever the surface; beyond, as many as it has vertices. Where there would be more their steps are doubled.
+/// Seeds kept for any surface; at most as many as it has vertices are added. If there would be more, their steps are
+/// doubled.
 const SEEDS_MIN: usize = 1 << 17;
 /// Steps are not stretched further: each long edge has its middle then, and next to nothing else.
 const STRETCH_MAX: f64 = 64.0;
@@ -20,7 +21,7 @@ const STRETCH_MAX: f64 = 64.0;
 struct Span {
     ends: [Point; 2],
     h: [f64; 2],
-    steeper: [f64; 2],
+    slope_factor: [f64; 2],
     length: f64,
     slope: f64,
 }
@@ -58,28 +59,28 @@ impl Span {
 
 /// Seeds of the edges and triangles that are long for the sizes at their corners; none on even surfaces.
 ///
-/// `at_vertices`, in input units: no seed is above what lies between them. Source of the rule: an experiment of ours with eleven surfaces from
-/// CAD programs, in which it left even surfaces as they were.
+/// `at_vertices`, in input units: no seed is above the interpolated values. Source of the rule: an experiment with
+/// eleven surfaces from CAD programs; it left even surfaces unchanged.
 pub(super) fn edge_seeds(
     seeds: &Seeds,
     triangles: &[[u32; 3]],
     targets: &Targets,
     at_vertices: Option<&[f64]>,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> Option<FrozenSpillVec<EdgeSeed>> {
-    let along = Along { seeds, slope: targets.beta * targets.steeper_max(), at_vertices };
+    let along = Along { seeds, slope: targets.beta * targets.slope_factor_max(), at_vertices };
     let most = (triangles.len() / 2).max(SEEDS_MIN);
     let mut stretch = 1.0;
     while stretch < STRETCH_MAX && along.count(triangles, stretch) > most {
         stretch *= 2.0;
     }
-    let mut list = room.list::<EdgeSeed>();
+    let mut list = scratch.builder::<EdgeSeed>();
     for triangle in triangles {
         along.take(triangle, stretch, &mut list);
     }
     match list.is_empty() {
         true => None,
-        false => Some(list.done().fixed()),
+        false => Some(list.finish().freeze()),
     }
 }
 
@@ -105,7 +106,7 @@ impl Along<'_> {
             let span = Span {
                 ends,
                 h,
-                steeper: edge.map(|v| self.seeds.steeper(v)),
+                slope_factor: edge.map(|v| self.seeds.slope_factor(v)),
                 length,
                 slope: self.slope,
             };
@@ -129,7 +130,7 @@ impl Along<'_> {
             span.each(stretch, |u| {
                 let between = |[a, b]: [f64; 2]| a + (b - a) * u;
                 let h = self.lowered(span.h_at(u), edge, [1.0 - u, u]);
-                list.push(seed(p + (q - p) * u, h, between(span.steeper)));
+                list.push(seed(p + (q - p) * u, h, between(span.slope_factor)));
             });
         }
         self.take_middle(triangle, list);
@@ -147,9 +148,9 @@ impl Along<'_> {
         let middle = (a + b + c) / 3.0;
         let grown = (corners.iter().zip(h)).map(|(p, h)| h + self.slope * p.distance(middle));
         let least = grown.fold(longest, f64::min);
-        let steeper = triangle.map(|v| self.seeds.steeper(v)).iter().sum::<f64>() / 3.0;
+        let slope_factor = triangle.map(|v| self.seeds.slope_factor(v)).iter().sum::<f64>() / 3.0;
         let h = self.lowered(least, *triangle, [1.0 / 3.0; 3]);
-        list.push(seed(middle, h, steeper));
+        list.push(seed(middle, h, slope_factor));
     }
 
     /// A size between vertices that have sizes of their own.
@@ -162,8 +163,8 @@ impl Along<'_> {
     }
 }
 
-fn seed(at: Point, h: f64, steeper: f64) -> EdgeSeed {
-    [at.x, at.y, at.z, h, steeper].map(|x| x as f32)
+fn seed(at: Point, h: f64, slope_factor: f64) -> EdgeSeed {
+    [at.x, at.y, at.z, h, slope_factor].map(|x| x as f32)
 }
 
 #[cfg(test)]
@@ -171,7 +172,13 @@ mod tests {
     use super::*;
 
     fn span(h: [f64; 2], length: f64) -> Span {
-        Span { ends: [Point::ZERO, Point::X * length], h, steeper: [1.0; 2], length, slope: 0.7 }
+        Span {
+            ends: [Point::ZERO, Point::X * length],
+            h,
+            slope_factor: [1.0; 2],
+            length,
+            slope: 0.7,
+        }
     }
 
     fn places(span: &Span) -> Vec<f64> {

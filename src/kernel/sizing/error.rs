@@ -1,4 +1,4 @@
-//! What can be wrong with wanted sizes.
+//! Errors of wanted sizes.
 
 impl SizingError {
     /// The option that the message begins with.
@@ -42,7 +42,7 @@ pub enum SizingError {
         text: String,
         /// Byte of the text.
         at: usize,
-        /// What is wrong with it.
+        /// The error.
         message: String,
     },
     /// An expression gives no length at some point.
@@ -63,7 +63,7 @@ pub enum SizingError {
     BadRegion {
         /// The region and size found.
         found: String,
-        /// What was expected, as a sentence.
+        /// The expected value, as a sentence.
         expected: String,
     },
     /// A file of sizes has another number of them than the surface has vertices.

@@ -3,21 +3,21 @@
 use super::SizingError;
 use super::constraint::SizeConstraint;
 use super::constraints::{BEND_MAX, SizeConstraints};
-use super::corners::Corners;
-use super::gather::seeds_of;
+use super::corners::TreeCorners;
+use super::gather::surface_seeds;
 use super::options::SizeOptions;
-use super::seeds::{OctreeFrame, frame_of};
+use super::seeds::{OctreeFrame, octree_frame};
 use super::sources::ResolvedSource;
 use super::summary::SizeSummary;
 use super::tree::{CELLS_PER_SIZE, DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
-use super::values::Maker;
+use super::values::CornerSizes;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{FrozenSpillVec, ScratchSpace, SpillVec};
 
-/// Levels that one look into the jump table replaces: 32,768 entries of 8 bytes stay in cache.
+/// Levels that one access to the jump table replaces: 32,768 entries of 8 bytes stay in cache.
 const JUMP: u32 = 5;
 
-/// Share of a room that values take at most, and what they may take of any.
+/// Largest share of the scratch space that values take, and the bytes they may take of any.
 const SHARE: u64 = 8;
 const SHARE_MIN: u64 = 512 << 10;
 
@@ -55,16 +55,16 @@ pub struct SizeField {
 
 /// Sizes besides those of the surface's edges and the options.
 #[derive(Clone, Copy, Default)]
-pub struct Further<'a> {
+pub struct ExtraSizes<'a> {
     /// Wanted sizes as functions of position.
     pub constraints: &'a [&'a dyn SizeConstraint],
     /// One for each vertex of the surface.
     pub at_vertices: Option<&'a [f64]>,
-    /// Of vertices that no triangle uses: vertex and size.
+    /// Vertices that no triangle uses, with their sizes.
     pub at_points: &'a [(u32, f64)],
 }
 
-/// Where the descent begins: the entry and its level, for each cell of a regular grid.
+/// Start of the descent: the entry and its level, for each cell of a regular grid.
 #[derive(Clone, Debug, PartialEq)]
 struct Jump {
     level: u32,
@@ -81,30 +81,32 @@ impl SizeField {
         triangles: &[[u32; 3]],
         options: &SizeOptions,
     ) -> Result<Self, SizingError> {
-        let room = ScratchSpace::boundless();
-        Ok(Self::build_with(points, triangles, options, &Further::default(), &room)?.0)
+        let scratch = ScratchSpace::boundless();
+        Ok(Self::build_with(points, triangles, options, &ExtraSizes::default(), &scratch)?.0)
     }
 
-    /// Builds the field with further sizes, and says where its sizes came from. The room changes nothing of it.
+    /// Builds the field with extra sizes, and summarizes the origin of its sizes. The result does not depend on
+    /// `scratch`.
     ///
     /// # Errors
-    /// As [`SizeField::build`]; a wish that is no size somewhere in the surface's box. A scratch file that fails unwinds
-    /// ([`attempt`](tetdb_base::storage::attempt)).
+    /// As [`SizeField::build`]; a constraint without a size somewhere in the surface's box. A scratch file that fails
+    /// unwinds ([`attempt`](tetdb_base::storage::attempt)).
     pub fn build_with(
         points: &[Point],
         triangles: &[[u32; 3]],
         options: &SizeOptions,
-        further: &Further,
-        room: &ScratchSpace,
+        extra: &ExtraSizes,
+        scratch: &ScratchSpace,
     ) -> Result<(Self, SizeSummary), SizingError> {
-        let (frame, bounds) = frame_of(points, triangles);
+        let (frame, bounds) = octree_frame(points, triangles);
         let targets = options.resolve(bounds.diagonal())?;
         let scaled = targets.scaled(1.0 / frame.side);
-        let mut seeds = seeds_of(points, triangles, frame, &scaled, further.at_vertices, room)?;
-        for &(v, h) in further.at_points {
+        let mut seeds =
+            surface_seeds(points, triangles, frame, &scaled, extra.at_vertices, scratch)?;
+        for &(v, h) in extra.at_points {
             seeds.h[v as usize] = h * seeds.per_side;
         }
-        let mut list = further.constraints.to_vec();
+        let mut list = extra.constraints.to_vec();
         list.extend(options.formula.iter().map(|f| f as &dyn SizeConstraint));
         let constraints = SizeConstraints {
             list: &list,
@@ -116,21 +118,21 @@ impl SizeField {
             beside: 0.0,
         };
         let tree = Tree::build(&seeds, &scaled, |tree| constraints.refine(tree))?;
-        let _held = room.hold(seeds.bytes() + tree.bytes());
-        let mut corners = Corners::of(&tree, room);
-        let mut maker = Maker {
+        let _held = scratch.lease(seeds.bytes() + tree.bytes());
+        let mut corners = TreeCorners::new(&tree, scratch);
+        let mut sizes = CornerSizes {
             tree: &tree,
             corners: &mut corners,
             seeds: &seeds,
             beta: scaled.beta,
-            steeper: None,
-            room,
+            slope_factor: None,
+            scratch,
         };
-        maker.allow_steeper();
-        let h = maker.values(&scaled, &constraints)?;
-        let field = Self::of_corners(frame, targets.beta, tree, corners, h, room)
+        sizes.gather_slope_factors();
+        let h = sizes.values(&scaled, &constraints)?;
+        let field = Self::from_corners(frame, targets.beta, tree, corners, h, scratch)
             .with_sources(options, bounds.diagonal())?;
-        let summary = field.summary(&seeds, &targets, options, room);
+        let summary = field.summary(&seeds, &targets, options, scratch);
         Ok((field, summary))
     }
 
@@ -150,15 +152,15 @@ impl SizeField {
     }
 
     /// The field of these sizes at the corners of leaves.
-    pub(super) fn of_corners(
+    pub(super) fn from_corners(
         frame: OctreeFrame,
         beta: f64,
         tree: Tree,
-        mut corners: Corners,
+        mut corners: TreeCorners,
         mut h: SpillVec<f32>,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
     ) -> Self {
-        let mut values = room.list_within(Self::share_of(room.cap()));
+        let mut values = scratch.builder_within(Self::share_of(scratch.cap()));
         for i in 0..corners.of_leaf.len() {
             let mut at_corners = [0.0; 8];
             for (value, c) in at_corners.iter_mut().zip(corners.of_leaf.get(i)) {
@@ -167,10 +169,10 @@ impl SizeField {
             values.push(at_corners);
         }
         drop((corners, h));
-        Self::from_parts(frame, beta, tree, values.done().fixed())
+        Self::from_parts(frame, beta, tree, values.finish().freeze())
     }
 
-    /// Bytes that values take of a room of `bytes`, at most.
+    /// Bytes that values take of a scratch space of `bytes`, at most.
     pub fn share_of(bytes: u64) -> u64 {
         (bytes / SHARE).max(SHARE_MIN)
     }
@@ -197,7 +199,7 @@ impl SizeField {
     #[inline]
     pub fn h(&self, p: Point) -> f64 {
         let at = self.on_lattice(p);
-        // Spelled out, here and below: `map` on arrays is not always inlined, and this is asked ten million times.
+        // Spelled out, here and below: `map` on arrays is not always inlined, and this is called ten million times.
         let of = |x: f64| (x as u32).min(LATTICE - 1);
         let cell = [of(at[0]), of(at[1]), of(at[2])];
         let (mut entry, mut level) = self.jump.at(cell);
@@ -216,7 +218,7 @@ impl SizeField {
         h
     }
 
-    /// Whether the octree is finer than a cube of that width somewhere near its middle.
+    /// Returns whether the octree is finer than a cube of that width somewhere near its middle.
     fn is_finer_in(&self, middle: Point, width: f64) -> bool {
         let is_finer = |p: Point| {
             let cell = self.on_lattice(p).map(|x| (x as u32).min(LATTICE - 1));
@@ -272,19 +274,19 @@ impl SizeField {
         self.octree_bytes() + self.values.bytes()
     }
 
-    /// Memory held when it was made in a room of so many bytes.
-    pub fn bytes_in(&self, room: u64) -> u64 {
+    /// Memory held by a field built in a scratch space of that many bytes.
+    pub fn bytes_in(&self, scratch: u64) -> u64 {
         let values = (self.values.len() * size_of::<[f32; 8]>()) as u64;
-        self.octree_bytes() as u64 + values.min(Self::share_of(room))
+        self.octree_bytes() as u64 + values.min(Self::share_of(scratch))
     }
 
-    /// What is held in any room.
+    /// Bytes held in any scratch space.
     pub fn octree_bytes(&self) -> usize {
         size_of::<Self>() + self.tree.bytes() + self.jump.cells.capacity() * size_of::<(u32, u32)>()
     }
 }
 
-/// Where the octree is divided, so is what takes its sizes; shapes beside it are known by their values only.
+/// A field built with these sizes is divided where their octree is; its shapes are sampled only.
 impl SizeConstraint for SizeField {
     fn h(&self, p: Point) -> Result<f64, SizingError> {
         Ok(Self::h(self, p))

@@ -2,7 +2,7 @@
 
 use super::SizingError;
 use super::constraint::SizeConstraint;
-use tetdb_base::expr::{Expression, Kind};
+use tetdb_base::expr::{ExprKind, Expression};
 use tetdb_base::geom::Point;
 
 /// An expression for the wanted length, in input units.
@@ -13,7 +13,7 @@ pub struct Formula {
 }
 
 impl Formula {
-    /// Reads a number made of `x`, `y`, `z` and what the language of [`expr`](tetdb_base::expr) has.
+    /// Parses a number of `x`, `y`, `z` in the language of [`expr`](tetdb_base::expr).
     ///
     /// # Errors
     /// The fault and its place in the text.
@@ -22,8 +22,8 @@ impl Formula {
         let expression =
             Expression::parse(text, &["x", "y", "z"]).map_err(|e| bad(e.at, e.message))?;
         match expression.kind() {
-            Kind::Number => Ok(Self { text: text.to_owned(), expression }),
-            Kind::Truth => Err(bad(0, "it is true or false, not a length".to_owned())),
+            ExprKind::Number => Ok(Self { text: text.to_owned(), expression }),
+            ExprKind::Truth => Err(bad(0, "it is true or false, not a length".to_owned())),
         }
     }
 }

@@ -19,38 +19,39 @@ const NEEDLE_FROM: f64 = 3.0;
 /// A vertex's size is the geometric mean of the arithmetic and the harmonic mean of its edges' lengths: equal to both where
 /// lengths are similar. With either alone, one needle's short edge would be ignored, or one would rule all its long neighbors.
 ///
-/// Memory: 8 bytes a vertex, 4 more where there are needles, and a quarter of the room: for so many vertices at a time the triangles are gone through.
-pub(super) fn seeds_of<'a>(
+/// Memory: 8 bytes a vertex, 4 more with needles, and a quarter of the scratch space, which decides how many vertices
+/// are handled in one pass over the triangles.
+pub(super) fn surface_seeds<'a>(
     points: &'a [Point],
     triangles: &[[u32; 3]],
     frame: OctreeFrame,
     targets: &Targets,
     at_vertices: Option<&[f64]>,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> Result<Seeds<'a>, SizingError> {
     if let Some(h) = at_vertices
         && h.len() != points.len()
     {
         return Err(SizingError::SizeCount { found: h.len(), expected: points.len() });
     }
-    let at_once = usize::try_from(room.available() / 4 / 32).unwrap_or(usize::MAX);
+    let at_once = usize::try_from(scratch.available() / 4 / 32).unwrap_or(usize::MAX);
     let at_once = at_once.clamp(1 << 16, points.len().max(1 << 16));
     let mut seeds = Seeds {
         points,
         frame,
         per_side: 1.0 / frame.side,
         h: vec![0.0; points.len()],
-        steeper: Vec::new(),
+        slope_factor: Vec::new(),
         along: None,
     };
     for first in (0..points.len()).step_by(at_once) {
         let sums = sums_from(first, at_once, points, triangles);
-        seeds.take_sums(first, &sums, targets.steeper_max());
+        seeds.take_sums(first, &sums, targets.slope_factor_max());
     }
     if seeds.h.iter().all(|&h| h == 0.0) || !frame.side.is_normal() {
         return Err(SizingError::NoEdges);
     }
-    seeds.along = edge_seeds(&seeds, triangles, targets, at_vertices, room);
+    seeds.along = edge_seeds(&seeds, triangles, targets, at_vertices, scratch);
     let given = at_vertices.into_iter().flatten();
     for (seed, &h) in seeds.h.iter_mut().zip(given) {
         *seed = seed.min(h / frame.side);
@@ -58,11 +59,17 @@ pub(super) fn seeds_of<'a>(
     Ok(seeds)
 }
 
-/// Of a vertex: the number of its edges' ends, their lengths' sum, their inverse lengths' sum, the longest.
-type Sums = [f64; 4];
+/// For a vertex: the number of its edges' ends, the sum of their lengths, the sum of their inverse lengths, the
+/// longest.
+type WeightedSums = [f64; 4];
 
 /// Sums of the vertices from `first` on.
-fn sums_from(first: usize, n: usize, points: &[Point], triangles: &[[u32; 3]]) -> Vec<Sums> {
+fn sums_from(
+    first: usize,
+    n: usize,
+    points: &[Point],
+    triangles: &[[u32; 3]],
+) -> Vec<WeightedSums> {
     let n = n.min(points.len() - first);
     let mut sums = vec![[0.0f64; 4]; n];
     for t in triangles {
@@ -86,19 +93,19 @@ fn sums_from(first: usize, n: usize, points: &[Point], triangles: &[[u32; 3]]) -
 }
 
 impl Seeds<'_> {
-    fn take_sums(&mut self, first: usize, sums: &[Sums], steeper_max: f64) {
+    fn take_sums(&mut self, first: usize, sums: &[WeightedSums], slope_factor_max: f64) {
         for (v, &[ends, sum, inverse, longest]) in (first..).zip(sums) {
             if ends == 0.0 {
                 continue;
             }
             let h = (sum / inverse).sqrt().max(MEAN_SHARE * sum / ends);
             self.h[v] = h * self.per_side;
-            let steeper = (longest / (NEEDLE_FROM * h)).clamp(1.0, steeper_max);
-            if steeper > 1.0 {
-                if self.steeper.is_empty() {
-                    self.steeper = vec![1.0; self.h.len()];
+            let slope_factor = (longest / (NEEDLE_FROM * h)).clamp(1.0, slope_factor_max);
+            if slope_factor > 1.0 {
+                if self.slope_factor.is_empty() {
+                    self.slope_factor = vec![1.0; self.h.len()];
                 }
-                self.steeper[v] = steeper as f32;
+                self.slope_factor[v] = slope_factor as f32;
             }
         }
     }

@@ -1,18 +1,19 @@
 //! Sizes that grow no steeper than the gradation allows.
 
-use super::bits::Bits;
-use super::corners::{Corners, PAIRS};
+use fixedbitset::FixedBitSet;
+
+use super::corners::{PAIRS, TreeCorners};
 use super::tree::{Leaf, Tree};
 use tetdb_base::storage::{SpillVec, check_cancelled};
 
 /// Rounds of grading and closing hanging corners. The last ones change little; each costs as much as
 /// the first.
 const GRADE_ROUNDS: u32 = 4;
-/// A hanging corner's mean may exceed its graded value by this factor: the bound on slopes is stated
-/// with more room, and at 1.001 every round finds something left to lower.
+/// A hanging corner's mean may exceed its graded value by this factor. The slope bound is stated with more slack; at
+/// 1.001 every round finds something left to lower.
 const EXCESS_MAX: f32 = 1.01;
 /// Gives hanging corners their means, where these are known.
-pub(super) fn close_finite(corners: &mut Corners, h: &mut SpillVec<f32>) {
+pub(super) fn close_finite(corners: &mut TreeCorners, h: &mut SpillVec<f32>) {
     for k in 0..corners.hanging.len() {
         let hanging = corners.hanging.get(k);
         let mean = mean_on(hanging.on, h);
@@ -33,28 +34,28 @@ fn mean_on(on: [u32; 4], h: &mut SpillVec<f32>) -> f32 {
 /// The slope bound between corners of the same leaf.
 pub(super) struct Grading<'a> {
     pub tree: &'a Tree,
-    pub corners: &'a mut Corners,
+    pub corners: &'a mut TreeCorners,
     pub beta: f64,
     /// By leaf, how many times `beta` its slope may be; once where it is not given.
-    pub steeper: Option<&'a mut SpillVec<f32>>,
+    pub slope_factor: Option<&'a mut SpillVec<f32>>,
 }
 
 impl Grading<'_> {
     /// Lowers values until no two corners of a leaf differ by more than the slope allows.
     ///
-    /// The result is the largest such function below the given values, whatever the order. Sweeps go forward and backward by turns, for
-    /// what is lowered is carried along by the sweep that goes its way.
-    pub(super) fn grade(&mut self, h: &mut SpillVec<f32>) {
-        // Corners whose neighbors have not been looked at since they were lowered.
-        let mut changed = Bits::new(h.len());
-        changed.set_all();
-        let mut next = Bits::new(h.len());
+    /// The result is the largest such function below the given values, in any order. Sweeps go forward and backward by
+    /// turns, because a lowered value travels along with the sweep of its direction.
+    pub fn grade(&mut self, h: &mut SpillVec<f32>) {
+        // Corners that were lowered since their neighbors were last checked.
+        let mut changed = FixedBitSet::with_capacity(h.len());
+        changed.insert_range(..);
+        let mut next = FixedBitSet::with_capacity(h.len());
         let mut is_backward = false;
         loop {
             check_cancelled();
             let mut sweep = Sweep {
                 of_leaf: &mut self.corners.of_leaf,
-                steeper: self.steeper.as_deref_mut(),
+                slope_factor: self.slope_factor.as_deref_mut(),
                 h,
                 changed: &mut changed,
                 next: &mut next,
@@ -76,9 +77,9 @@ impl Grading<'_> {
 
     /// Grades, and gives hanging corners their means: lowering only, so that both hold in the end.
     ///
-    /// A mean above its graded value lowers the largest of the corners it is taken from, none of them
-    /// below that value: so the smallest value of all stays what it is.
-    pub(super) fn grade_closed(&mut self, h: &mut SpillVec<f32>) {
+    /// A mean above its graded value lowers the largest corners of its four, none of them below that value: so the
+    /// smallest value of all is unchanged.
+    pub fn grade_closed(&mut self, h: &mut SpillVec<f32>) {
         for _ in 0..GRADE_ROUNDS {
             self.grade(h);
             let mut changed = false;
@@ -104,10 +105,10 @@ impl Grading<'_> {
 /// One way through all leaves.
 struct Sweep<'a> {
     of_leaf: &'a mut SpillVec<[u32; 8]>,
-    steeper: Option<&'a mut SpillVec<f32>>,
+    slope_factor: Option<&'a mut SpillVec<f32>>,
     h: &'a mut SpillVec<f32>,
-    changed: &'a mut Bits,
-    next: &'a mut Bits,
+    changed: &'a mut FixedBitSet,
+    next: &'a mut FixedBitSet,
     beta: f64,
     is_done: bool,
 }
@@ -116,7 +117,7 @@ impl Sweep<'_> {
     #[inline]
     fn relax(&mut self, number: u32, leaf: Leaf) {
         let ids = self.of_leaf.get(number as usize);
-        if !ids.iter().any(|&id| self.changed.get(id)) {
+        if !ids.iter().any(|&id| self.changed.contains(id as usize)) {
             return;
         }
         let mut before = [0.0; 8];
@@ -124,11 +125,11 @@ impl Sweep<'_> {
             *h = self.h.get(id as usize);
         }
         let mut h = before;
-        let steeper = match &mut self.steeper {
+        let slope_factor = match &mut self.slope_factor {
             Some(by_leaf) => f64::from(by_leaf.get(number as usize)),
             None => 1.0,
         };
-        let step = self.beta * leaf.side() * steeper;
+        let step = self.beta * leaf.side() * slope_factor;
         // Largest differences, by squared distance of corners in sides.
         let steps = [0.0, step, step * 2f64.sqrt(), step * 3f64.sqrt()];
         while relax_once(&mut h, &steps) {}
@@ -139,14 +140,14 @@ impl Sweep<'_> {
         for ((id, h), before) in ids.into_iter().zip(h).zip(before) {
             if h != before {
                 self.h.set(id as usize, h);
-                self.changed.set(id);
-                self.next.set(id);
+                self.changed.insert(id as usize);
+                self.next.insert(id as usize);
             }
         }
     }
 }
 
-/// Lowers each of a leaf's values to what the others allow; says whether one changed.
+/// Lowers each of a leaf's values to the bound of the others; returns whether one changed.
 #[inline]
 fn relax_once(h: &mut [f32; 8], steps: &[f64; 4]) -> bool {
     let (low, high) =

@@ -1,9 +1,9 @@
-//! The load ∫ h⁻³ over the filled volumes, as far as vertices will be added there.
+//! The load ∫ h⁻³ over the filled volumes, without the skin at the surface in which no vertices are added.
 //!
-//! Cells of the octree, and parts of its leaves, are taken in the order of what is not known of them: a cell is divided
-//! while the sizes in it differ, or the surface may pass through it. Inside and outside are told by the
-//! triangle above a cell's middle; a cell nearer to its middle than the surface has one answer for all its parts.
-//! In the cells that are left at the surface points are drawn; their volume as a whole is known from the triangles.
+//! Cells of the octree, and parts of its leaves, are taken in the order of their uncertainty. A cell is divided while
+//! the sizes in it differ, or the surface may pass through it. The triangle above a cell's middle decides between
+//! inside and outside; a cell nearer to its middle than the surface has one answer for all its parts. In the remaining
+//! cells at the surface points are sampled; their total volume follows from the triangles.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -14,30 +14,33 @@ use super::field::SizeField;
 use super::tree::{DEPTH, LEAF, Leaf, octant_of};
 use tetdb_base::geom::{Point, mix};
 use tetdb_base::storage::{for_each_mut, parallel, spare_threads};
-use tetdb_base::surface::{Seeker, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, Seeker};
 
-/// Cells looked at, at most. Eight times as many move the sum by 0.2 %, and took half of the time of small runs.
+/// Cells examined, at most. Eight times as many change the sum by 0.2 %, and took half of the time of small runs.
 const CELLS_MAX: usize = 1 << 13;
-/// Cells looked at, at least: the estimate of what is not known needs some.
+/// Cells examined, at least: the estimate of the uncertainty needs some.
 const CELLS_MIN: usize = 1 << 11;
-/// Wanted accuracy of the sum. What is unknown of cells at the surface has either sign and is added by squares.
+/// Wanted accuracy of the sum. Errors of cells at the surface have either sign and are added by squares.
 const TOLERANCE: f64 = 0.003;
-/// Cells whose parts are looked at together, where there are threads: most of the next in order are divided one after the other.
-const AHEAD: usize = 32;
+/// Cells whose parts are examined in one batch, if there are threads: most of the next cells in order are divided
+/// anyway.
+const BATCH_CELLS: usize = 32;
 /// Points drawn in the cells that the surface passes through, at least.
 const POINTS: usize = 1 << 14;
-/// Triangles a question to the surface may look at before fewer cells and points are asked about: ordinary surfaces have a tenth.
+/// Triangles that one search on the surface may test before fewer cells and points are examined: ordinary surfaces have
+/// a tenth.
 const EFFORT_ORDINARY: f64 = 500.0;
 /// Cells and points are no fewer than this share: the sum then is good to a tenth.
 const SHARE_MIN: f64 = 0.0625;
-/// What they tell of the volume is believed to be wrong by no more than this factor.
+/// Greatest factor by which the sampled volume is believed to be wrong.
 const FACTOR_MAX: f64 = 2.0;
 /// Share of a cell's uncertain part that is wrong in the mean, when cut by the surface.
 const SHARE_CUT: f64 = 0.3;
-/// The same for sizes that differ within part of a leaf, where they are read at eight points.
+/// Share of the uncertain part that is wrong in the mean, for sizes that differ within part of a leaf and are read at
+/// eight points.
 const SHARE_SIZES: f64 = 0.02;
 
-/// How near to the surface no vertex comes, in units of h.
+/// Layer at the surface without vertices, in units of h.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceSkin {
     /// To triangles, and to vertices.
@@ -51,7 +54,7 @@ pub struct Domain<'a> {
     /// Finds where points lie relative to the surface.
     pub seeker: &'a Seeker<'a>,
     /// The volumes of the surface.
-    pub volumes: &'a Volumes,
+    pub volumes: &'a EnclosedVolumes,
     /// By volume.
     pub filled: &'a [bool],
 }
@@ -61,28 +64,28 @@ struct IntegrationCell {
     leaf: Leaf,
     /// The octree's entry at this cell or above it.
     entry: u32,
-    /// Whether it is all in a filled volume.
+    /// True if it is all in a filled volume.
     is_inside: bool,
-    /// Whether it is also farther from the surface than what is left out.
+    /// True if it is also farther from the surface than the skin.
     is_deep: bool,
     load: f64,
-    /// Of its filled part, where the surface does not pass through it.
+    /// Volume of its filled part, if the surface does not pass through it.
     volume: f64,
     unknown: f64,
-    /// Whether what is left out may begin or end in it; whether the surface may pass through it.
+    /// True if the skin's limit may pass through it; true if the surface may pass through it.
     is_cut: bool,
     is_crossed: bool,
-    /// Whether vertices are added in it.
+    /// True if vertices are added in it.
     is_counted: bool,
 }
 
 impl SizeField {
     /// Load of the points of `domain` that are outside the skin of its surface.
     ///
-    /// Accuracy: about one part in a hundred. The same bits on every machine and for any number of threads.
+    /// Accuracy: about one part in a hundred. The bits are the same on every machine and for any number of threads.
     pub fn load(&self, domain: &Domain, skin: SurfaceSkin) -> f64 {
         let share = (EFFORT_ORDINARY / domain.seeker.effort()).clamp(SHARE_MIN, 1.0);
-        let mut sum = Sum {
+        let mut sum = LoadSum {
             field: self,
             share,
             domain,
@@ -96,7 +99,7 @@ impl SizeField {
             cut: 0.0,
             sizes: 0.0,
         };
-        sum.add(sum.looked(IntegrationCell {
+        sum.add(sum.examined(IntegrationCell {
             leaf: Leaf::ROOT,
             entry: self.tree.root,
             is_inside: false,
@@ -136,9 +139,9 @@ fn range(values: &[f32; 8]) -> [f32; 2] {
     all.fold([f32::INFINITY, 0.0], |[l, h], &x| [l.min(x), h.max(x)])
 }
 
-struct Sum<'a> {
+struct LoadSum<'a> {
     field: &'a SizeField,
-    /// Of the ordinary number of cells and points.
+    /// Share of the ordinary number of cells and points.
     share: f64,
     domain: &'a Domain<'a>,
     skin: SurfaceSkin,
@@ -151,12 +154,12 @@ struct Sum<'a> {
     /// Load and volume of cells of which all is known.
     known: f64,
     volume: f64,
-    /// Squares of what is unknown at the surface; sum of what is unknown elsewhere.
+    /// Squares of the uncertainty at the surface; sum of the uncertainty elsewhere.
     cut: f64,
     sizes: f64,
 }
 
-impl Sum<'_> {
+impl LoadSum<'_> {
     fn run(mut self) -> f64 {
         let [cells_min, cells_max] =
             [CELLS_MIN, CELLS_MAX].map(|n| (n as f64 * self.share) as usize);
@@ -179,20 +182,20 @@ impl Sum<'_> {
         }
         let mut rest: Vec<ByUnknown> = std::mem::take(&mut self.heap).into_vec();
         rest.sort_unstable();
-        self.known + self.of_rest(&rest)
+        self.known + self.load_of_rest(&rest)
     }
 
-    /// The cell of which most is unknown, and its parts. With threads to spare those of the next cells in order are found
-    /// with them: what is found of a cell depends on nothing but the cell.
+    /// The cell of greatest uncertainty, and its parts. If threads are free, the parts of the next cells in order are
+    /// examined in the same batch; the result depends on nothing but the cell.
     fn pop(&mut self) -> Option<(IntegrationCell, [IntegrationCell; 8])> {
         let mut first = self.heap.pop()?;
         if first.parts.is_none() {
-            let n = if spare_threads() > 1 { AHEAD } else { 1 };
+            let n = if spare_threads() > 1 { BATCH_CELLS } else { 1 };
             let mut batch = vec![first];
             batch.extend(std::iter::from_fn(|| self.heap.pop()).take(n - 1));
             for_each_mut(&mut batch, |next| {
                 if next.parts.is_none() {
-                    let part = |octant| self.looked(self.child(&next.cell, octant));
+                    let part = |octant| self.examined(self.child(&next.cell, octant));
                     next.parts = Some(Box::new(std::array::from_fn(part)));
                 }
             });
@@ -202,10 +205,10 @@ impl Sum<'_> {
         Some((first.cell, *first.parts?))
     }
 
-    /// Load of the cells that are left. Those the surface passes through are looked at in points drawn within them: a plane at the
-    /// distance of the middle would cut off too little where the surface bends, all around a ball, and makes no sense
-    /// where a cell holds many parts of it. What the points tell is corrected by what they tell of the volume, which is known.
-    fn of_rest(&self, rest: &[ByUnknown]) -> f64 {
+    /// Load of the cells that are left. In cells that the surface passes through, points are sampled. A plane at the
+    /// distance of the middle would cut off too little where the surface bends, and is useless where a cell contains
+    /// many parts of it. The sampled load is scaled by the ratio of exact to sampled volume.
+    fn load_of_rest(&self, rest: &[ByUnknown]) -> f64 {
         let (mut load, mut volume) = (0.0, self.volume);
         let mut crossed: Vec<&IntegrationCell> = self.crossed.iter().collect();
         for ByUnknown { cell, .. } in rest {
@@ -218,9 +221,10 @@ impl Sum<'_> {
         }
         let points = (POINTS as f64 * self.share) as usize;
         let each = points.div_ceil(crossed.len().max(1)) as u64;
-        let drawn: Vec<[f64; 2]> =
-            parallel(|| crossed.into_par_iter().map(|cell| self.drawn(cell, each)).collect());
-        let [found, at_surface] = (drawn.iter()).fold([0.0; 2], |s, d| [s[0] + d[0], s[1] + d[1]]);
+        let sampled: Vec<[f64; 2]> =
+            parallel(|| crossed.into_par_iter().map(|cell| self.sampled(cell, each)).collect());
+        let [found, at_surface] =
+            (sampled.iter()).fold([0.0; 2], |s, d| [s[0] + d[0], s[1] + d[1]]);
         let expected = self.domain.volume() - volume;
         let factor = match found > 0.0 {
             true => (expected / found).clamp(1.0 / FACTOR_MAX, FACTOR_MAX),
@@ -230,7 +234,7 @@ impl Sum<'_> {
     }
 
     /// Volume and load of a cell's filled part by the mean of some points in it.
-    fn drawn(&self, cell: &IntegrationCell, points: u64) -> [f64; 2] {
+    fn sampled(&self, cell: &IntegrationCell, points: u64) -> [f64; 2] {
         let (field, skin) = (self.field, self.skin);
         let Domain { seeker, volumes, filled } = *self.domain;
         let side = field.frame.side;
@@ -271,7 +275,7 @@ impl Sum<'_> {
         IntegrationCell { leaf, entry, ..*cell }
     }
 
-    /// Keeps a cell that was looked at. Returns the load that went into the heap.
+    /// Keeps an examined cell. Returns the load that went into the heap.
     fn add(&mut self, cell: IntegrationCell) -> f64 {
         if !cell.is_counted {
             self.volume += cell.volume;
@@ -298,14 +302,14 @@ impl Sum<'_> {
         }
     }
 
-    /// A cell whose place is set, with what is found out about it.
-    fn looked(&self, mut cell: IntegrationCell) -> IntegrationCell {
-        cell.is_counted = self.look(&mut cell);
+    /// Examines a cell with a given place.
+    fn examined(&self, mut cell: IntegrationCell) -> IntegrationCell {
+        cell.is_counted = self.examine(&mut cell);
         cell
     }
 
     /// Finds out about a cell; false when no vertices are added in it.
-    fn look(&self, cell: &mut IntegrationCell) -> bool {
+    fn examine(&self, cell: &mut IntegrationCell) -> bool {
         let field = self.field;
         let width = cell.leaf.side() * field.frame.side;
         let middle =
@@ -386,8 +390,8 @@ impl Sum<'_> {
         [low, high.max(low)]
     }
 
-    /// h⁻³, of no length below the side of the octree's finest cells: where vertices touch but for a bit, sizes next to nothing
-    /// stand for a point, and a cell cannot tell how fast they grow around it.
+    /// h⁻³, for no length below the side of the octree's finest cells. Where vertices nearly coincide, tiny sizes stand
+    /// for a point, and a cell cannot resolve how fast they grow around it.
     fn inverse_cube(&self, h: f64) -> f64 {
         let h = h.max(self.least);
         1.0 / (h * h * h)
@@ -405,10 +409,10 @@ impl Sum<'_> {
     }
 }
 
-/// Cells by what is unknown of them, then by place.
+/// Cells ordered by uncertainty, then by place.
 struct ByUnknown {
     cell: IntegrationCell,
-    /// Its parts, if they were looked at already.
+    /// The parts of the cell, if they were examined already.
     parts: Option<Box<[IntegrationCell; 8]>>,
 }
 

@@ -42,7 +42,7 @@ impl Length {
     /// Reads `0.25` or `1%`; `option` names the value in errors.
     ///
     /// # Errors
-    /// [`SizingError::BadValue`] for what is not a number above zero.
+    /// [`SizingError::BadValue`] for a text that is not a number above zero.
     pub fn parse(option: &'static str, text: &str) -> Result<Self, SizingError> {
         let trimmed = text.trim();
         let (digits, percent) = match trimmed.strip_suffix('%') {

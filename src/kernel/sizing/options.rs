@@ -132,7 +132,7 @@ impl SizeOptions {
         slope_of_gradation(self.gradation())
     }
 
-    /// The same next to needles.
+    /// Slope bound next to needles.
     pub(super) fn beta_needles(&self) -> f64 {
         slope_of_gradation(self.hgrad.unwrap_or(GRADATION_NEEDLES))
     }
@@ -186,17 +186,17 @@ fn bad_gradation(found: &str) -> SizingError {
 /// Wanted lengths of one surface, in one unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Targets {
-    pub(super) hsiz: Option<f64>,
-    pub(super) hmin: Option<f64>,
-    pub(super) hmax: Option<f64>,
+    pub hsiz: Option<f64>,
+    pub hmin: Option<f64>,
+    pub hmax: Option<f64>,
     /// Slope bound of the field, and where the surface has needles.
-    pub(super) beta: f64,
-    pub(super) beta_needles: f64,
+    pub beta: f64,
+    pub beta_needles: f64,
 }
 
 impl Targets {
     /// The same lengths in another unit.
-    pub(super) fn scaled(self, factor: f64) -> Self {
+    pub fn scaled(self, factor: f64) -> Self {
         let scale = |x: Option<f64>| x.map(|x| x * factor);
         Self {
             hsiz: scale(self.hsiz),
@@ -207,18 +207,18 @@ impl Targets {
         }
     }
 
-    /// How many times the slope bound is allowed at most.
-    pub(super) fn steeper_max(&self) -> f64 {
+    /// Largest factor on the slope bound.
+    pub fn slope_factor_max(&self) -> f64 {
         self.beta_needles / self.beta
     }
 
-    /// Whether anything but the surface's edges was asked for.
-    pub(super) fn any(&self) -> bool {
+    /// Returns whether anything but the surface's edges was asked for.
+    pub fn any(&self) -> bool {
         self.hsiz.is_some() || self.hmin.is_some() || self.hmax.is_some()
     }
 
     /// The size wanted in the interior where the surface alone would give `h`.
-    pub(super) fn interior(&self, h: f64) -> f64 {
+    pub fn interior(&self, h: f64) -> f64 {
         let h = self.hsiz.unwrap_or(h);
         h.max(self.hmin.unwrap_or(0.0)).min(self.hmax.unwrap_or(f64::INFINITY))
     }

@@ -1,10 +1,10 @@
-//! One size for some of the volumes a surface encloses.
+//! One size for some of the enclosed volumes.
 
 use super::SizingError;
 use super::constraint::SizeConstraint;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::ScratchSpace;
-use tetdb_base::surface::{Seeker, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, Seeker};
 
 /// Cells at the border of a region are at most this many of its lengths wide.
 const BORDER_CELLS: f64 = 2.0;
@@ -12,7 +12,7 @@ const BORDER_CELLS: f64 = 2.0;
 /// A length inside a region; away from it lengths grow as the gradation allows.
 pub struct Region<'a> {
     seeker: &'a Seeker<'a>,
-    volumes: &'a Volumes,
+    volumes: &'a EnclosedVolumes,
     /// By volume.
     is_here: Vec<bool>,
     /// Sees the triangles around the region.
@@ -25,11 +25,11 @@ impl<'a> Region<'a> {
     /// Length `h` in the volumes that `is_here` names, for a field of slope `beta`. A scratch file that fails unwinds.
     pub fn new(
         seeker: &'a Seeker<'a>,
-        volumes: &'a Volumes,
+        volumes: &'a EnclosedVolumes,
         is_here: Vec<bool>,
         h: f64,
         beta: f64,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
     ) -> Self {
         let is_border = |t: u32| {
             let [front, back] = volumes.of_side[t as usize].map(|v| is_here[v as usize]);
@@ -38,7 +38,7 @@ impl<'a> Region<'a> {
         Self {
             seeker,
             volumes,
-            border: Seeker::of(seeker.surface(), room, is_border),
+            border: Seeker::with_filter(seeker.surface(), scratch, is_border),
             is_here,
             h,
             beta,

@@ -16,13 +16,13 @@ pub(super) type EdgeSeed = [f32; 5];
 /// The cube of the octree: `low` corner and `side`, in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct OctreeFrame {
-    pub(super) low: Point,
-    pub(super) side: f64,
+    pub low: Point,
+    pub side: f64,
 }
 
 impl OctreeFrame {
     /// A cube around the box, larger by 2^-10 so that points on the box are inside it.
-    pub(super) fn around(bounds: &Aabb) -> Self {
+    pub fn around(bounds: &Aabb) -> Self {
         let extent = (bounds.high - bounds.low).max_element();
         let side = extent * (1.0 + 1.0 / 1024.0);
         Self { low: (bounds.low + bounds.high) * 0.5 - Point::splat(0.5 * side), side }
@@ -32,31 +32,31 @@ impl OctreeFrame {
 /// Places with sizes, in units of the cube's side: the surface's vertices, numbered as there, and behind them places along its edges.
 #[derive(Debug)]
 pub(super) struct Seeds<'a> {
-    pub(super) points: &'a [Point],
-    pub(super) frame: OctreeFrame,
-    pub(super) per_side: f64,
+    pub points: &'a [Point],
+    pub frame: OctreeFrame,
+    pub per_side: f64,
     /// By vertex; zero where no triangle has it.
-    pub(super) h: Vec<f64>,
+    pub h: Vec<f64>,
     /// By vertex, how many times the gradation's slope is allowed there; empty where it is once for all.
-    pub(super) steeper: Vec<f32>,
-    /// What follows the vertices.
-    pub(super) along: Option<FrozenSpillVec<EdgeSeed>>,
+    pub slope_factor: Vec<f32>,
+    /// Seeds along edges, numbered after the vertices.
+    pub along: Option<FrozenSpillVec<EdgeSeed>>,
 }
 
 impl<'a> Seeds<'a> {
     /// The vertices that triangles use, in their order.
-    pub(super) fn vertices(&self) -> impl Iterator<Item = u32> {
+    pub fn vertices(&self) -> impl Iterator<Item = u32> {
         (0u32..).zip(&self.h).filter(|(_, h)| **h > 0.0).map(|(v, _)| v)
     }
 
     /// The vertices that triangles use, then the places along edges.
-    pub(super) fn all(&self) -> impl Iterator<Item = u32> {
+    pub fn all(&self) -> impl Iterator<Item = u32> {
         let first = self.points.len() as u32;
         let n = self.along.as_ref().map_or(0, FrozenSpillVec::len) as u32;
         self.vertices().chain(first..first + n)
     }
 
-    /// What follows the vertices, if it is not one of them.
+    /// The seed along an edge; `None` if `seed` is a vertex.
     #[inline]
     fn along(&self, seed: u32) -> Option<EdgeSeed> {
         let behind = (seed as usize).checked_sub(self.points.len())?;
@@ -65,7 +65,7 @@ impl<'a> Seeds<'a> {
 
     /// Position of a seed in the unit cube.
     #[inline]
-    pub(super) fn at(&self, seed: u32) -> Point {
+    pub fn at(&self, seed: u32) -> Point {
         match self.along(seed) {
             Some([x, y, z, ..]) => Point::new(f64::from(x), f64::from(y), f64::from(z)),
             None => self.in_cube(self.points[seed as usize]),
@@ -78,33 +78,33 @@ impl<'a> Seeds<'a> {
 
     /// Size at a seed.
     #[inline]
-    pub(super) fn h(&self, seed: u32) -> f64 {
+    pub fn h(&self, seed: u32) -> f64 {
         match self.along(seed) {
             Some([.., h, _]) => f64::from(h),
             None => self.h[seed as usize],
         }
     }
 
-    /// How many times the gradation's slope is allowed at a seed.
-    pub(super) fn steeper(&self, seed: u32) -> f64 {
+    /// Factor on the gradation's slope that is allowed at a seed.
+    pub fn slope_factor(&self, seed: u32) -> f64 {
         match self.along(seed) {
-            Some([.., steeper]) => f64::from(steeper),
-            None => (self.steeper.get(seed as usize)).map_or(1.0, |&s| f64::from(s)),
+            Some([.., slope_factor]) => f64::from(slope_factor),
+            None => (self.slope_factor.get(seed as usize)).map_or(1.0, |&s| f64::from(s)),
         }
     }
 
-    /// Whether more than the gradation's slope is allowed anywhere.
-    pub(super) fn is_steeper(&self) -> bool {
-        !self.steeper.is_empty()
+    /// Returns whether more than the gradation's slope is allowed anywhere.
+    pub fn has_slope_factors(&self) -> bool {
+        !self.slope_factor.is_empty()
     }
 
-    /// Bytes of memory held for vertices; places along edges are in a room's arrays.
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(&self.h[..]) + size_of_val(&self.steeper[..])
+    /// Bytes of memory held for vertices; seeds along edges are in arrays of the scratch space.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.h[..]) + size_of_val(&self.slope_factor[..])
     }
 
     /// The vertices that triangles use, with sizes that are known, in a cube that is.
-    pub(super) fn with_sizes(
+    pub fn with_sizes(
         points: &'a [Point],
         triangles: &[[u32; 3]],
         frame: OctreeFrame,
@@ -120,12 +120,19 @@ impl<'a> Seeds<'a> {
         if triangles.is_empty() {
             return Err(SizingError::NoEdges);
         }
-        Ok(Self { points, frame, per_side: 1.0 / frame.side, h, steeper: Vec::new(), along: None })
+        Ok(Self {
+            points,
+            frame,
+            per_side: 1.0 / frame.side,
+            h,
+            slope_factor: Vec::new(),
+            along: None,
+        })
     }
 }
 
 /// The cube around the points that triangles use, and their box.
-pub(super) fn frame_of(points: &[Point], triangles: &[[u32; 3]]) -> (OctreeFrame, Aabb) {
+pub(super) fn octree_frame(points: &[Point], triangles: &[[u32; 3]]) -> (OctreeFrame, Aabb) {
     let corners = triangles.iter().flatten().map(|&v| points[v as usize]);
     let bounds = Aabb::around(corners);
     (OctreeFrame::around(&bounds), bounds)

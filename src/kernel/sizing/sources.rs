@@ -1,7 +1,7 @@
-//! Sizes asked for in a box, a sphere or a cylinder, graded outwards by formula.
+//! Sizes in a box, a sphere or a cylinder, graded outwards by formula.
 //!
-//! Inside the shape the size is `inside`, away from it at most `outside` (no bound when it is not given), and
-//! between the two it changes with the slope of the gradation: the minimum with the octree keeps that slope.
+//! Inside the shape the size is `inside`, away from it at most `outside` (unbounded if not given). Between the two it
+//! changes with the slope of the gradation; the minimum with the octree keeps that slope.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use tetdb_base::geom::Point;
 
 /// A convex region, closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
+pub enum SourceShape {
     /// A box along the axes.
     Box {
         /// Least coordinates.
@@ -35,14 +35,14 @@ pub enum Shape {
     },
 }
 
-/// Sizes inside and outside a shape, as asked for.
+/// Sizes inside and outside a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeSource {
-    /// Where the sizes hold.
-    pub shape: Shape,
+    /// The shape in which the sizes hold.
+    pub shape: SourceShape,
     /// Size inside the shape.
     pub inside: Length,
-    /// Size outside it, if one was asked for.
+    /// Size outside it, if one was given.
     pub outside: Option<Length>,
 }
 
@@ -52,14 +52,14 @@ impl SizeSource {
     /// # Errors
     /// Names the option and the value.
     pub fn parse_box(text: &str) -> Result<Self, SizingError> {
-        let form = Form {
+        let text = SourceText {
             option: "size_box",
             expected: "X0,Y0,Z0,X1,Y1,Z1,H or X0,Y0,Z0,X1,Y1,Z1,H,OUTSIDE",
             text,
         };
-        let ([a, b, c, d, e, f], inside, outside) = form.read()?;
+        let ([a, b, c, d, e, f], inside, outside) = text.read()?;
         let (p, q) = (Point::new(a, b, c), Point::new(d, e, f));
-        let shape = Shape::Box { low: p.min(q), high: p.max(q) };
+        let shape = SourceShape::Box { low: p.min(q), high: p.max(q) };
         Ok(Self { shape, inside, outside })
     }
 
@@ -68,17 +68,17 @@ impl SizeSource {
     /// # Errors
     /// Names the option and the value.
     pub fn parse_sphere(text: &str) -> Result<Self, SizingError> {
-        let form = Form {
+        let text = SourceText {
             option: "size_sphere",
             expected: "X,Y,Z,R,H or X,Y,Z,R,H,OUTSIDE with R not below zero",
             text,
         };
-        let ([x, y, z, radius], inside, outside) = form.read()?;
+        let ([x, y, z, radius], inside, outside) = text.read()?;
         if radius < 0.0 {
-            return Err(form.bad());
+            return Err(text.bad());
         }
         let center = Point::new(x, y, z);
-        Ok(Self { shape: Shape::Sphere { center, radius }, inside, outside })
+        Ok(Self { shape: SourceShape::Sphere { center, radius }, inside, outside })
     }
 
     /// Reads `X0,Y0,Z0,X1,Y1,Z1,R,H[,OUTSIDE]`: the ends of the axis, which differ, and the radius.
@@ -86,25 +86,25 @@ impl SizeSource {
     /// # Errors
     /// Names the option and the value.
     pub fn parse_cylinder(text: &str) -> Result<Self, SizingError> {
-        let form = Form {
+        let text = SourceText {
             option: "size_cylinder",
             expected: "X0,Y0,Z0,X1,Y1,Z1,R,H or X0,Y0,Z0,X1,Y1,Z1,R,H,OUTSIDE with two different ends",
             text,
         };
-        let ([a, b, c, d, e, f, radius], inside, outside) = form.read()?;
+        let ([a, b, c, d, e, f, radius], inside, outside) = text.read()?;
         let ends = [Point::new(a, b, c), Point::new(d, e, f)];
         if radius < 0.0 || ends[0] == ends[1] {
-            return Err(form.bad());
+            return Err(text.bad());
         }
-        Ok(Self { shape: Shape::Cylinder { ends, radius }, inside, outside })
+        Ok(Self { shape: SourceShape::Cylinder { ends, radius }, inside, outside })
     }
 
     /// The option that asks for such a source.
     pub fn option(&self) -> &'static str {
         match self.shape {
-            Shape::Box { .. } => "size_box",
-            Shape::Sphere { .. } => "size_sphere",
-            Shape::Cylinder { .. } => "size_cylinder",
+            SourceShape::Box { .. } => "size_box",
+            SourceShape::Sphere { .. } => "size_sphere",
+            SourceShape::Cylinder { .. } => "size_cylinder",
         }
     }
 
@@ -113,9 +113,9 @@ impl SizeSource {
     pub(super) fn check(&self) -> Result<(), SizingError> {
         let form = self.to_string();
         match self.shape {
-            Shape::Box { .. } => Self::parse_box(&form),
-            Shape::Sphere { .. } => Self::parse_sphere(&form),
-            Shape::Cylinder { .. } => Self::parse_cylinder(&form),
+            SourceShape::Box { .. } => Self::parse_box(&form),
+            SourceShape::Sphere { .. } => Self::parse_sphere(&form),
+            SourceShape::Cylinder { .. } => Self::parse_cylinder(&form),
         }
         .map(|_| ())
     }
@@ -134,9 +134,9 @@ impl fmt::Display for SizeSource {
     /// As the parser of its shape reads it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (points, radius) = match self.shape {
-            Shape::Box { low, high } => (vec![low, high], None),
-            Shape::Sphere { center, radius } => (vec![center], Some(radius)),
-            Shape::Cylinder { ends, radius } => (ends.to_vec(), Some(radius)),
+            SourceShape::Box { low, high } => (vec![low, high], None),
+            SourceShape::Sphere { center, radius } => (vec![center], Some(radius)),
+            SourceShape::Cylinder { ends, radius } => (ends.to_vec(), Some(radius)),
         };
         let numbers = points.iter().flat_map(|p| p.to_array()).chain(radius);
         let lengths = [Some(self.inside), self.outside].into_iter().flatten();
@@ -146,13 +146,13 @@ impl fmt::Display for SizeSource {
 }
 
 /// A text of numbers and one or two lengths.
-struct Form<'a> {
+struct SourceText<'a> {
     option: &'static str,
     expected: &'static str,
     text: &'a str,
 }
 
-impl Form<'_> {
+impl SourceText<'_> {
     fn bad(&self) -> SizingError {
         SizingError::BadValue {
             option: self.option,
@@ -180,20 +180,20 @@ impl Form<'_> {
 /// A source in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ResolvedSource {
-    shape: Shape,
+    shape: SourceShape,
     inside: f64,
     outside: f64,
 }
 
 impl ResolvedSource {
-    /// The smallest size it asks for.
-    pub(super) fn least(&self) -> f64 {
+    /// The smallest size of the source.
+    pub fn least(&self) -> f64 {
         self.inside.min(self.outside)
     }
 
     /// The size wanted at `p` in a field of slope `beta`.
     #[inline]
-    pub(super) fn h(&self, p: Point, beta: f64) -> f64 {
+    pub fn h(&self, p: Point, beta: f64) -> f64 {
         let depth = self.shape.depth(p);
         // Both branches are the smaller of the two sizes on the shape's boundary.
         if depth >= 0.0 {
@@ -204,7 +204,7 @@ impl ResolvedSource {
     }
 }
 
-impl Shape {
+impl SourceShape {
     /// Distance to the boundary, positive inside. Inside a box and a cylinder it is that to the nearest wall.
     fn depth(&self, p: Point) -> f64 {
         match *self {

@@ -1,31 +1,31 @@
-//! Summing up a field.
+//! Summarizes a field.
 
 use super::field::SizeField;
 use super::length::Length;
 use super::options::{SizeOptions, Targets};
 use super::seeds::Seeds;
-use super::summary::{Range, SizeSummary, SizeWarning};
+use super::summary::{SizeRange, SizeSummary, SizeWarning};
 use tetdb_base::geom::short;
-use tetdb_base::storage::{ScratchSpace, raise, sort_record};
+use tetdb_base::storage::{OrRaise, ScratchSpace, sort_record};
 
 impl SizeField {
-    /// What the field is like, and where its sizes came from. A scratch file that fails unwinds.
+    /// Summary of the field and the origin of its sizes. A scratch file that fails unwinds.
     pub(super) fn summary(
         &self,
         seeds: &Seeds,
         targets: &Targets,
         options: &SizeOptions,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
     ) -> SizeSummary {
         let side = self.frame.side;
         let all = seeds.vertices().map(|v| (seeds.h(v) * side, 1.0));
-        let surface = weighted_range(all, room);
+        let surface = weighted_range(all, scratch);
         let middles = self.tree.leaves().enumerate().map(|(i, leaf)| {
             let values = self.values.get(i);
             let mean = values.iter().map(|&h| f64::from(h)).sum::<f64>() / 8.0;
             (mean * side, leaf.side() * leaf.side() * leaf.side())
         });
-        let median = weighted_range(middles, room).median;
+        let median = weighted_range(middles, scratch).median;
         let (low, high) = self.range();
         let wanted = [("hsiz", targets.hsiz), ("hmax", targets.hmax)];
         let warnings = wanted.into_iter().filter_map(|(option, wanted)| {
@@ -43,9 +43,9 @@ impl SizeField {
             is_far_above.then_some(SizeWarning::NeverReached { option, wanted, most: high })
         });
         SizeSummary {
-            source: source_of(options, targets),
+            source: describe_source(options, targets),
             surface,
-            field: Range { low, median, high },
+            field: SizeRange { low, median, high },
             beta: targets.beta,
             n_leaves: self.n_leaves(),
             bytes: self.bytes(),
@@ -63,18 +63,17 @@ sort_record! {
 }
 
 /// Lowest, weighted median and highest of a list of positive numbers with weights that is not empty.
-fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -> Range {
-    let mut sorter = room.sorter::<Weighted>();
+fn weighted_range(list: impl Iterator<Item = (f64, f64)>, scratch: &ScratchSpace) -> SizeRange {
+    let mut sorter = scratch.sorter::<Weighted>();
     let mut total = 0.0;
     for (x, weight) in list {
         total += weight;
-        let pushed = sorter.push(Weighted { x, weight });
-        pushed.unwrap_or_else(|e| raise(e));
+        sorter.push(Weighted { x, weight }).or_raise();
     }
     let mut sum = 0.0;
-    let mut range = Range { low: f64::INFINITY, median: f64::NAN, high: 0.0 };
-    for next in sorter.finish().unwrap_or_else(|e| raise(e)) {
-        let Weighted { x, weight } = next.unwrap_or_else(|e| raise(e));
+    let mut range = SizeRange { low: f64::INFINITY, median: f64::NAN, high: 0.0 };
+    for next in sorter.finish().or_raise() {
+        let Weighted { x, weight } = next.or_raise();
         let is_below = sum < 0.5 * total;
         sum += weight;
         if is_below && sum >= 0.5 * total {
@@ -89,14 +88,15 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -
 /// not divided, so that large triangles would stand against small tetrahedra.
 const FAR_BELOW: f64 = 0.4;
 
-/// Above this multiple of the longest length that the field has, a wanted one is warned about: it is as good as none, and often in another unit.
+/// A wanted size above this multiple of the field's longest length is warned about: it has no effect, and is often in
+/// another unit.
 const FAR_ABOVE: f64 = 4.0;
 
 fn plural(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
-fn source_of(options: &SizeOptions, targets: &Targets) -> String {
+fn describe_source(options: &SizeOptions, targets: &Targets) -> String {
     let mut parts = Vec::new();
     let named = [
         ("hsiz", options.hsiz, targets.hsiz),

@@ -1,4 +1,4 @@
-//! What a user is told about sizes.
+//! The summary of sizes for the user.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use tetdb_base::geom::short;
 
 /// Lowest, median and highest of some lengths, in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
+pub struct SizeRange {
     /// The least length.
     pub low: f64,
     /// The median length.
@@ -15,44 +15,44 @@ pub struct Range {
     pub high: f64,
 }
 
-/// Where sizes came from and what they are.
+/// Origin and range of sizes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SizeSummary {
     /// Options in effect, in words.
     pub source: String,
     /// Sizes of the surface's vertices: means of their edges' lengths.
-    pub surface: Range,
+    pub surface: SizeRange,
     /// Sizes of the field; the median is by volume of the surface's cube, not of the domain.
-    pub field: Range,
+    pub field: SizeRange,
     /// Slope bound, `ln(hgrad)`.
     pub beta: f64,
     /// Leaves of the octree.
     pub n_leaves: usize,
     /// Memory of the field in bytes.
     pub bytes: usize,
-    /// What the user may not expect.
+    /// Surprising consequences of the options.
     pub warnings: Vec<SizeWarning>,
 }
 
-/// What will not come out as the user may expect.
+/// A consequence of the options that may surprise the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SizeWarning {
     /// The wanted interior size is far below the surface's edges, which are kept.
     FarBelowSurface {
-        /// The option that asks for the size.
+        /// The option that sets the size.
         option: &'static str,
-        /// The size it asks for.
+        /// The size it sets.
         wanted: f64,
         /// Median size of the surface.
         surface_median: f64,
-        /// How far from edges of that length the gradation lets sizes come down to it.
+        /// Distance from edges of that length at which the gradation lets sizes come down to it.
         away: f64,
     },
     /// The wanted interior size is longer than the gradation lets sizes grow within the surface.
     NeverReached {
-        /// The option that asks for the size.
+        /// The option that sets the size.
         option: &'static str,
-        /// The size it asks for.
+        /// The size it sets.
         wanted: f64,
         /// The longest that comes out.
         most: f64,
@@ -104,7 +104,7 @@ impl fmt::Display for SizeWarning {
 
 impl fmt::Display for SizeSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Range { low, median, high } = self.surface;
+        let SizeRange { low, median, high } = self.surface;
         write!(
             f,
             "sizes from {}; surface median {} ({} to {}), wanted inside its box {} ({} to {})",

@@ -4,9 +4,9 @@ use super::*;
 use crate::samples::SampleSpec;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::ScratchSpace;
-use tetdb_base::surface::{Seeker, Surface, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface};
 
-/// A small generator for test points; the seed is printed by what fails.
+/// A small generator for test points; failures print the seed.
 struct Dice(u64);
 
 impl Dice {
@@ -147,7 +147,7 @@ fn interior_size_is_joined_to_the_surface() {
         assert!((center / inside - 1.0).abs() < 0.02, "{center}");
         let wall = field.h(Point::new(0.0, 0.5, 0.5));
         assert!((wall / surface_h - 1.0).abs() < 0.2, "{wall} {surface_h}");
-        // Half way of the ramp, within what one cell can smear.
+        // Half way of the ramp, within the smear of one cell.
         let depth = 0.5 * (inside - surface_h).abs() / field.beta();
         let ramp = field.h(Point::new(depth, 0.5, 0.5));
         let wanted = 0.5 * (inside + surface_h);
@@ -155,16 +155,16 @@ fn interior_size_is_joined_to_the_surface() {
     }
 }
 
-fn seeds_of<'a>(
+fn surface_seeds<'a>(
     surface: &'a (Vec<Point>, Vec<[u32; 3]>),
     options: &SizeOptions,
 ) -> seeds::Seeds<'a> {
     let (points, triangles) = surface;
-    let (frame, bounds) = seeds::frame_of(points, triangles);
+    let (frame, bounds) = seeds::octree_frame(points, triangles);
     let targets = options.resolve(bounds.diagonal()).unwrap();
     let scaled = targets.scaled(1.0 / frame.side);
-    let room = ScratchSpace::boundless();
-    gather::seeds_of(points, triangles, frame, &scaled, None, &room).unwrap()
+    let scratch = ScratchSpace::boundless();
+    gather::surface_seeds(points, triangles, frame, &scaled, None, &scratch).unwrap()
 }
 
 fn sample(text: &str) -> (Vec<Point>, Vec<[u32; 3]>) {
@@ -176,8 +176,8 @@ fn sample(text: &str) -> (Vec<Point>, Vec<[u32; 3]>) {
 fn expected(surface: &(Vec<Point>, Vec<[u32; 3]>), field: &SizeField) -> f64 {
     let surface =
         Surface { points: surface.0.clone(), triangles: surface.1.clone(), ..Surface::default() };
-    let seeker = Seeker::of(&surface, &ScratchSpace::boundless(), |_| true);
-    let volumes = Volumes::of(&seeker);
+    let seeker = Seeker::with_filter(&surface, &ScratchSpace::boundless(), |_| true);
+    let volumes = EnclosedVolumes::new(&seeker);
     let mut filled = vec![true; volumes.n_volumes as usize];
     filled[tetdb_base::surface::OUTSIDE as usize] = false;
     let domain = Domain { seeker: &seeker, volumes: &volumes, filled: &filled };
@@ -197,8 +197,8 @@ fn a_low_step_asks_for_what_its_vertices_need_and_for_no_bands() {
 fn even_surfaces_have_no_sizes_but_their_vertices() {
     for text in ["box,h=0.1", "balls,count=20", "sphere", "knot"] {
         let surface = sample(text);
-        let seeds = seeds_of(&surface, &SizeOptions::default());
-        assert!(!seeds.is_steeper(), "{text}");
+        let seeds = surface_seeds(&surface, &SizeOptions::default());
+        assert!(!seeds.has_slope_factors(), "{text}");
         assert_eq!(seeds.all().count(), surface.0.len(), "{text}");
     }
 }
@@ -227,7 +227,7 @@ fn a_gradation_that_is_asked_for_is_kept_next_to_needles() {
 fn steep_surfaces_are_followed() {
     let steep = graded(50.0, 60);
     let field = build(&steep, &SizeOptions::default());
-    let seeds = seeds_of(&steep, &SizeOptions::default());
+    let seeds = surface_seeds(&steep, &SizeOptions::default());
     let all: Vec<u32> = seeds.vertices().collect();
     let side = field.frame.side;
     let (mut near, mut ratio_low, mut ratio_high) = (0, f64::INFINITY, 0.0f64);
@@ -281,7 +281,7 @@ fn formulas_that_give_no_size_are_refused() {
         assert!(matches!(found, SizingError::NoSize { .. }), "{text} {found}");
         assert!(found.to_string().contains(text), "{found}");
     }
-    // Outside the surface's box nothing is asked.
+    // Outside the surface's box the constraint is not sampled.
     let inside = "if(min(x,min(y,z))<-1e-9 or max(x,max(y,z))>1.000000001,0/0,0.1)";
     assert!(SizeField::build(&even.0, &even.1, &formula(inside)).is_ok());
     for text in ["x +", "w", "x > 0", ""] {
@@ -303,10 +303,10 @@ fn equal_bits_in_a_room_too_small() {
         (&even, formula("0.02 + 0.1*abs(x - 0.4)")),
     ] {
         let [wide, narrow] = [ScratchSpace::boundless(), ScratchSpace::new(1 << 16, dir.path())]
-            .map(|room| {
+            .map(|scratch| {
                 let (points, triangles) = surface;
-                let further = Further::default();
-                SizeField::build_with(points, triangles, &options, &further, &room).unwrap()
+                let extra = ExtraSizes::default();
+                SizeField::build_with(points, triangles, &options, &extra, &scratch).unwrap()
             });
         assert!(narrow.0.bytes() > 0 && wide.1.n_leaves > 1000, "{}", wide.1.n_leaves);
         assert_eq!(wide.0.to_bytes(), narrow.0.to_bytes());
@@ -356,7 +356,7 @@ fn bytes_are_read_back_and_damage_is_named() {
     }
 }
 
-/// The cube's surface with what is asked of it.
+/// The cube's surface with its size options.
 fn with_domain<T>(surface: &(Vec<Point>, Vec<[u32; 3]>), ask: impl FnOnce(&Domain) -> T) -> T {
     // Walls are welded: each grid has its own points.
     let mut welded = Surface::default();
@@ -374,7 +374,7 @@ fn with_domain<T>(surface: &(Vec<Point>, Vec<[u32; 3]>), ask: impl FnOnce(&Domai
         .collect();
     welded.triangles = surface.1.iter().map(|t| t.map(|v| ids[v as usize])).collect();
     let seeker = Seeker::new(&welded);
-    let volumes = Volumes::of(&seeker);
+    let volumes = EnclosedVolumes::new(&seeker);
     let filled: Vec<bool> = (0..volumes.n_volumes).map(|v| v > 0).collect();
     assert_eq!(filled, [false, true]);
     ask(&Domain { seeker: &seeker, volumes: &volumes, filled: &filled })
@@ -413,7 +413,7 @@ fn loads_are_integrals() {
 
 #[test]
 fn vertices_that_nearly_touch_have_a_bounded_load() {
-    // A triangle divided at a point as near to one of its corners as doubles can tell, in the middle of a wall.
+    // A triangle divided at a point next to one of its corners, at the limit of doubles, in the middle of a wall.
     let whole = cube(4, |i| i as f64 / 4.0);
     let mut twin = whole.clone();
     let t = twin.1.len() / 2;
@@ -461,7 +461,7 @@ fn summaries_say_where_sizes_came_from() {
         &points,
         &triangles,
         &asked,
-        &Further::default(),
+        &ExtraSizes::default(),
         &ScratchSpace::boundless(),
     )
     .unwrap();

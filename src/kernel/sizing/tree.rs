@@ -1,5 +1,5 @@
-//! The octree: where sizes differ, and beside small bodies far from all others, cells of about the local size; elsewhere, cells as
-//! large as may be.
+//! The octree. Cells have about the local size where sizes differ, and near small bodies far from all others; elsewhere
+//! they are as large as possible.
 //!
 //! Two leaves that share as much as a corner differ by one level at most. Cells are addressed on an
 //! integer lattice of 2^20 per axis; octants and corners are numbered x + 2y + 4z.
@@ -27,49 +27,51 @@ const SPREAD_MAX: f64 = 2.0;
 /// The means of its eight parts may differ this much, if each has at least `TREND_SEEDS`.
 const TREND_MAX: f64 = 1.2;
 const TREND_SEEDS: u32 = 4;
-/// A cell wider than this many of its smallest size, times the root of the number of seeds in and around the cell that it is part of, lies
-/// far from all but a small body. A surface of even edges that comes near it has fourteen times as many seeds, a straight rod enough for 48 sizes.
-/// With 8 a body alone in a cube takes up to twice as many tetrahedra; with 2 a tenth fewer, and rods count less.
+/// A cell wider than this many of its smallest size, times the root of the number of seeds in and around its parent,
+/// lies far from all but a small body. A surface of even edges that comes near has fourteen times as many seeds, a
+/// straight rod enough for 48 sizes. With 8 a body alone in a cube takes up to twice as many tetrahedra; with 2 a tenth
+/// fewer, and rods count less.
 const SPARSE_FROM: f64 = 4.0;
 /// Interior sizes within this ratio of the surface's need no transition.
 const TARGET_MAX: f64 = 1.15;
 /// Lists at least this long are divided in parallel.
 const PARALLEL_SEEDS: usize = 8192;
-/// Parts of longer ones are gone through one after the other, each in parallel within: what all parts together would hold is 14 times a list.
+/// The parts of longer lists are handled one after the other, each in parallel within: all parts together would hold 14
+/// times a list.
 const PARALLEL_SEEDS_MAX: usize = 1 << 18;
 
-/// Where a leaf is on the lattice; its side is `2^(DEPTH - level)`.
+/// Position of a leaf on the lattice; its side is `2^(DEPTH - level)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Leaf {
-    pub(super) anchor: [u32; 3],
-    pub(super) level: u32,
+    pub anchor: [u32; 3],
+    pub level: u32,
 }
 
 impl Leaf {
-    pub(super) const ROOT: Self = Self { anchor: [0; 3], level: 0 };
+    pub const ROOT: Self = Self { anchor: [0; 3], level: 0 };
 
     /// Side in lattice units.
-    pub(super) fn width(&self) -> u32 {
+    pub fn width(&self) -> u32 {
         LATTICE >> self.level
     }
 
     /// Side in units of the root's.
-    pub(super) fn side(&self) -> f64 {
+    pub fn side(&self) -> f64 {
         1.0 / f64::from(1u32 << self.level)
     }
 
-    pub(super) fn low(&self) -> Point {
+    pub fn low(&self) -> Point {
         let [x, y, z] = self.anchor.map(f64::from);
         Point::new(x, y, z) * (1.0 / f64::from(LATTICE))
     }
 
-    pub(super) fn child(&self, octant: usize) -> Self {
+    pub fn child(&self, octant: usize) -> Self {
         let level = self.level + 1;
         Self { anchor: shift(self.anchor, octant, LATTICE >> level), level }
     }
 
     /// Lattice position of a corner.
-    pub(super) fn corner(&self, corner: usize) -> [u32; 3] {
+    pub fn corner(&self, corner: usize) -> [u32; 3] {
         shift(self.anchor, corner, self.width())
     }
 }
@@ -83,13 +85,13 @@ fn shift(p: [u32; 3], octant: usize, by: u32) -> [u32; 3] {
 /// Invariant once numbered: blocks and leaves in depth-first order, so that near cells are near in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tree {
-    pub(super) root: u32,
-    pub(super) blocks: Vec<[u32; 8]>,
+    pub root: u32,
+    pub blocks: Vec<[u32; 8]>,
 }
 
 impl Tree {
     /// The balanced octree for these seeds and wanted sizes (all in units of the root's side), divided further before it is balanced.
-    pub(super) fn build(
+    pub fn build(
         seeds: &Seeds,
         targets: &Targets,
         divide_further: impl FnOnce(&mut Self) -> Result<(), SizingError>,
@@ -99,7 +101,7 @@ impl Tree {
     }
 
     /// The same, for some of the seeds.
-    pub(super) fn build_near(
+    pub fn build_near(
         some: &[u32],
         seeds: &Seeds,
         targets: &Targets,
@@ -114,12 +116,12 @@ impl Tree {
     }
 
     /// Bytes of memory held.
-    pub(super) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         self.blocks.capacity() * size_of::<[u32; 8]>()
     }
 
     /// From the depth-first list of "is divided".
-    pub(super) fn from_shape(shape: &[bool]) -> Self {
+    pub fn from_shape(shape: &[bool]) -> Self {
         fn entry(shape: &mut impl Iterator<Item = bool>, blocks: &mut Vec<[u32; 8]>) -> u32 {
             if shape.next() != Some(true) {
                 return LEAF;
@@ -149,7 +151,7 @@ impl Tree {
     }
 
     /// Number and level of the leaf that holds a lattice cell.
-    pub(super) fn leaf_at(&self, cell: [u32; 3]) -> (u32, u32) {
+    pub fn leaf_at(&self, cell: [u32; 3]) -> (u32, u32) {
         let (mut entry, mut level) = (self.root, 0);
         while entry & LEAF == 0 {
             entry = self.blocks[entry as usize][octant_of(cell, level)];
@@ -159,17 +161,17 @@ impl Tree {
     }
 
     /// All cells, depth first, each before its children; of a leaf its number.
-    pub(super) fn cells(&self) -> Cells<'_> {
+    pub fn cells(&self) -> Cells<'_> {
         Cells { tree: self, stack: vec![(self.root, Leaf::ROOT)], is_backward: false }
     }
 
     /// All leaves, depth first: in the order of their numbers, once they are numbered.
-    pub(super) fn leaves(&self) -> impl Iterator<Item = Leaf> {
+    pub fn leaves(&self) -> impl Iterator<Item = Leaf> {
         self.cells().filter_map(|(number, leaf)| number.map(|_| leaf))
     }
 
     /// All leaves with their numbers, from the last to the first.
-    pub(super) fn leaves_backward(&self) -> impl Iterator<Item = (u32, Leaf)> {
+    pub fn leaves_backward(&self) -> impl Iterator<Item = (u32, Leaf)> {
         let cells = Cells { is_backward: true, ..self.cells() };
         cells.filter_map(|(number, leaf)| Some((number?, leaf)))
     }
@@ -194,7 +196,7 @@ impl Tree {
         Ok(())
     }
 
-    /// Divides what is next to a leaf and larger than twice its width.
+    /// Divides neighbors of a leaf that are larger than twice its width.
     fn divide_around(&mut self, leaf: Leaf) -> Result<(), SizingError> {
         for cell in leaf.outer_neighbors() {
             while let (Some((block, octant)), found) = self.find(cell) {
@@ -274,7 +276,7 @@ pub(super) fn octant_of(cell: [u32; 3], level: u32) -> usize {
 impl Leaf {
     /// Lattice cells next to this leaf outside its parent: up to seven, across the faces, edges and
     /// corner that it shares with its parent.
-    pub(super) fn outer_neighbors(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
+    pub fn outer_neighbors(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
         let (anchor, width) = (self.anchor, self.width());
         (1..8usize).filter_map(move |across| {
             let mut cell = anchor;
@@ -293,8 +295,8 @@ impl Leaf {
     }
 }
 
-/// Which cells are divided, depth first, `near` being the seeds in the cell or half its side around it, `n_around` the number of those
-/// of the cell it is part of.
+/// Subdivision of a cell, depth first. `near`: the seeds in the cell or half its side around it; `n_around`: their
+/// number for the parent cell.
 fn shape_of(
     cell: Leaf,
     near: &[u32],
@@ -331,14 +333,14 @@ fn near_child(cell: Leaf, near: &[u32], seeds: &Seeds) -> Option<Vec<u32>> {
         let p = seeds.at(*s);
         p.cmpge(low).all() && p.cmple(high).all()
     };
-    // Room for all is asked for and next to none of it touched: a list that grows takes up to three times its bytes.
+    // The capacity covers all seeds, and most of it stays untouched: a growing list takes up to three times its bytes.
     let mut list = Vec::with_capacity(near.len());
     list.extend(near.iter().copied().filter(is_near));
     list.shrink_to_fit();
     (list.len() < near.len()).then_some(list)
 }
 
-/// Whether sizes in and around a cell ask for smaller cells.
+/// Returns whether sizes in and around a cell ask for smaller cells.
 fn is_divided(cell: Leaf, near: &[u32], n_around: usize, seeds: &Seeds, targets: &Targets) -> bool {
     if cell.level == DEPTH || near.is_empty() {
         return false;

@@ -1,25 +1,26 @@
 //! Sizes at the octree's corners: gathered from the surface, filled in between, graded.
 
+use fixedbitset::FixedBitSet;
+
 use super::SizingError;
-use super::bits::Bits;
 use super::constraints::SizeConstraints;
-use super::corners::Corners;
+use super::corners::TreeCorners;
 use super::grading::{Grading, bound, close_finite};
 use super::options::Targets;
 use super::seeds::Seeds;
 use super::tree::{LATTICE, Leaf, Tree};
 use tetdb_base::geom::Point;
-use tetdb_base::storage::{ScratchSpace, SpillVec, check_cancelled, raise, sort_record};
+use tetdb_base::storage::{OrRaise, ScratchSpace, SpillVec, check_cancelled, sort_record};
 
-/// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the distance to the surface): after these, the number of
-/// tetrahedra expected of a scanned skull is within 0.4 % of that of the limit.
+/// Rounds of averaging that smooth filled values. The graph is shallow (cells grow with the distance to the surface).
+/// After these rounds, the number of tetrahedra expected of a scanned skull is within 0.4 % of the limit.
 const FILL_ROUNDS: u32 = 18;
-/// What a round leaves of the slowest part of the error, were it mere averaging: sixty such rounds would do no better than these, which look back
-/// at the round before (the Chebyshev semi-iteration: Golub, Varga 1961).
+/// Share of the slowest part of the error that plain averaging leaves after a round. Sixty rounds of plain averaging
+/// would do no better than these, which use the round before as well (the Chebyshev semi-iteration: Golub, Varga 1961).
 const SLOWEST: f32 = 0.98;
-/// How far from the mean of its neighbors a value may be, as a factor.
+/// Largest factor between a value and the mean of its neighbors.
 const REACH: f32 = 2.0;
-/// Of each of a cell's corners the three that its edges lead to.
+/// For each corner of a cell, the three corners at the other ends of its edges.
 const ALONG_EDGES: [[u8; 3]; 8] =
     [[1, 2, 4], [0, 3, 5], [0, 3, 6], [1, 2, 7], [0, 5, 6], [1, 4, 7], [2, 4, 7], [3, 5, 6]];
 
@@ -31,21 +32,21 @@ sort_record! {
     }
 }
 
-/// What sizes at corners are made from.
-pub(super) struct Maker<'a> {
+/// Computes sizes at corners from these parts.
+pub(super) struct CornerSizes<'a> {
     pub tree: &'a Tree,
-    pub corners: &'a mut Corners,
+    pub corners: &'a mut TreeCorners,
     pub seeds: &'a Seeds<'a>,
     pub beta: f64,
     /// By leaf, how many times `beta` its slope may be; once where it is not given.
-    pub steeper: Option<SpillVec<f32>>,
-    pub room: &'a ScratchSpace,
+    pub slope_factor: Option<SpillVec<f32>>,
+    pub scratch: &'a ScratchSpace,
 }
 
-impl Maker<'_> {
+impl CornerSizes<'_> {
     /// Sizes at all corners, in units of the root's side, no steeper than the gradation along any line
     /// between two corners of a leaf.
-    pub(super) fn values(
+    pub fn values(
         &mut self,
         targets: &Targets,
         constraints: &SizeConstraints,
@@ -68,42 +69,42 @@ impl Maker<'_> {
     }
 
     /// Lets leaves near needles be steeper, as the seeds allow it in the mean: gathered and filled in as sizes are.
-    pub(super) fn allow_steeper(&mut self) {
-        if !self.seeds.is_steeper() {
+    pub fn gather_slope_factors(&mut self) {
+        if !self.seeds.has_slope_factors() {
             return;
         }
-        let (at_seeds, _) = self.gather(|seeds, v| seeds.steeper(v), false);
+        let (at_seeds, _) = self.gather(|seeds, v| seeds.slope_factor(v), false);
         let mut at_corners = self.fill(at_seeds);
-        let mut by_leaf = self.room.column(self.corners.of_leaf.len(), 1.0f32);
+        let mut by_leaf = self.scratch.vec(self.corners.of_leaf.len(), 1.0f32);
         for i in 0..by_leaf.len() {
             let ids = self.corners.of_leaf.get(i);
             let sum: f64 = (ids.iter()).map(|&id| f64::from(at_corners.get(id as usize))).sum();
             by_leaf.set(i, (sum / 8.0) as f32);
         }
-        self.steeper = Some(by_leaf);
+        self.slope_factor = Some(by_leaf);
     }
 
-    /// Weighted means of a value of the seeds at the corners of the leaves that hold them, infinite elsewhere;
-    /// and, when asked for, distances from there to the nearest of these seeds.
+    /// Weighted means of a value of the seeds at the corners of the leaves that hold them, infinite elsewhere; and,
+    /// with `with_nearest`, distances from there to the nearest of these seeds.
     ///
-    /// Seeds are taken leaf by leaf, those of a leaf in their order. What falls on a hanging corner is handed to the corners it hangs on.
-    pub(super) fn gather(
+    /// Seeds are taken leaf by leaf, those of a leaf in their order. The share of a hanging corner goes to the corners
+    /// it hangs on.
+    pub fn gather(
         &mut self,
         value: impl Fn(&Seeds, u32) -> f64,
         with_nearest: bool,
     ) -> (SpillVec<f32>, Option<SpillVec<f64>>) {
         let (tree, seeds, n) = (self.tree, self.seeds, self.corners.n_corners);
-        let mut by_leaf = self.room.sorter::<LeafSeed>();
+        let mut by_leaf = self.scratch.sorter::<LeafSeed>();
         for v in seeds.all() {
             let (leaf, _) = tree.leaf_at(lattice_cell(seeds.at(v)));
-            let pushed = by_leaf.push(LeafSeed { leaf, seed: v });
-            pushed.unwrap_or_else(|e| raise(e));
+            by_leaf.push(LeafSeed { leaf, seed: v }).or_raise();
         }
-        let by_leaf = by_leaf.finish().unwrap_or_else(|e| raise(e));
-        let mut sums = self.room.column(n, [0.0f64; 2]);
-        let mut nearest = with_nearest.then(|| self.room.column(n, f64::INFINITY));
+        let by_leaf = by_leaf.finish().or_raise();
+        let mut sums = self.scratch.vec(n, [0.0f64; 2]);
+        let mut nearest = with_nearest.then(|| self.scratch.vec(n, f64::INFINITY));
         for next in by_leaf {
-            let LeafSeed { seed, .. } = next.unwrap_or_else(|e| raise(e));
+            let LeafSeed { seed, .. } = next.or_raise();
             let (at, h) = (seeds.at(seed), value(seeds, seed));
             let cell = lattice_cell(at);
             let (number, level) = tree.leaf_at(cell);
@@ -139,7 +140,7 @@ impl Maker<'_> {
                 }
             }
         }
-        let mut means = self.room.column(n, f32::INFINITY);
+        let mut means = self.scratch.vec(n, f32::INFINITY);
         for i in 0..n {
             let [sum, weight] = sums.get(i);
             if weight > 0.0 {
@@ -151,29 +152,29 @@ impl Maker<'_> {
 
     /// Fills the corners that have no value: fronts of averages of their neighbors, then averaging of all
     /// filled ones among themselves, which tends to the harmonic interpolation.
-    pub(super) fn fill(&mut self, gathered: SpillVec<f32>) -> SpillVec<f32> {
+    pub fn fill(&mut self, gathered: SpillVec<f32>) -> SpillVec<f32> {
         let mut h = gathered;
-        let mut is_open = Bits::new(h.len());
+        let mut is_open = FixedBitSet::with_capacity(h.len());
         for i in 0..h.len() {
             if h.get(i).is_infinite() {
-                is_open.set(i as u32);
+                is_open.insert(i);
             }
         }
         // Leaves with a corner to fill, as (leaf, weight): a cell's edge conducts as its width.
-        let mut open = self.room.list::<[u32; 2]>();
+        let mut open = self.scratch.builder::<[u32; 2]>();
         for (i, leaf) in self.tree.leaves().enumerate() {
             let ids = self.corners.of_leaf.get(i);
-            if ids.iter().any(|&c| is_open.get(c)) {
+            if ids.iter().any(|&c| is_open.contains(c as usize)) {
                 open.push([i as u32, (leaf.side() as f32).to_bits()]);
             }
         }
-        let mut open = open.done();
+        let mut open = open.finish();
         if open.is_empty() {
             return h;
         }
-        let mut sums = self.room.column(h.len(), [0.0f32; 2]);
-        // Of the round before.
-        let mut before = self.room.column(h.len(), 0.0f32);
+        let mut sums = self.scratch.vec(h.len(), [0.0f32; 2]);
+        // Values of the round before.
+        let mut before = self.scratch.vec(h.len(), 0.0f32);
         let (mut smooth, mut over) = (0, 1.0);
         while smooth < FILL_ROUNDS {
             check_cancelled();
@@ -190,14 +191,15 @@ impl Maker<'_> {
             }
             let mut complete = true;
             for i in 0..h.len() {
-                if is_open.get(i as u32) {
+                if is_open.contains(i) {
                     let [sum, weight] = sums.get(i);
                     if weight > 0.0 {
                         let (old, older) = (h.get(i), before.get(i));
                         complete &= old.is_finite();
                         before.set(i, old);
                         let mean = sum / weight;
-                        // Beside steep steps, and where corners hang between others, what looks back would run away, even below zero.
+                        // Next to steep steps, and at corners that hang between others, extrapolation would run away,
+                        // even below zero.
                         let next = match over > 1.0 {
                             true => older + over * (mean - older),
                             false => mean,
@@ -212,23 +214,24 @@ impl Maker<'_> {
         h
     }
 
-    pub(super) fn grading(&mut self) -> Grading<'_> {
+    pub fn grading(&mut self) -> Grading<'_> {
         Grading {
             tree: self.tree,
             corners: self.corners,
             beta: self.beta,
-            steeper: self.steeper.as_mut(),
+            slope_factor: self.slope_factor.as_mut(),
         }
     }
 
-    /// What the gradation allows beside sizes at some corners, each at a distance from where it holds: the least, the most.
-    pub(super) fn cones(
+    /// Lower and upper bounds that the gradation sets around corners with sizes; `nearest` is the distance of each
+    /// corner from the place of its size.
+    pub fn cones(
         &mut self,
         gathered: &mut SpillVec<f32>,
         mut nearest: SpillVec<f64>,
     ) -> [SpillVec<f32>; 2] {
         [-1.0f32, 1.0].map(|sign| {
-            let mut cone = self.room.column(gathered.len(), f32::INFINITY);
+            let mut cone = self.scratch.vec(gathered.len(), f32::INFINITY);
             for i in 0..cone.len() {
                 let h = gathered.get(i);
                 if h.is_finite() {
@@ -244,12 +247,12 @@ impl Maker<'_> {
     }
 }
 
-/// Adds to the sums at a leaf's open corners what its twelve edges bring there.
+/// Adds the contributions of a leaf's twelve edges to the sums at its open corners.
 #[inline(always)]
 fn average(
     ids: &[u32; 8],
     weight: f32,
-    is_open: &Bits,
+    is_open: &FixedBitSet,
     h: &mut SpillVec<f32>,
     sums: &mut SpillVec<[f32; 2]>,
 ) {
@@ -258,7 +261,7 @@ fn average(
         *value = h.get(id as usize);
     }
     for (&id, along) in ids.iter().zip(ALONG_EDGES) {
-        if !is_open.get(id) {
+        if !is_open.contains(id as usize) {
             continue;
         }
         sums.change(id as usize, |sum| {

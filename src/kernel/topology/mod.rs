@@ -1,8 +1,8 @@
-//! Who neighbors whom: owners of interface faces, kept up at every bisection.
+//! Neighbors of sub-domains: owners of interface faces, updated at every bisection.
 //!
-//! A cut's faces have numbers; for each, the table of the cut says which part has it on the low side and which on the
-//! high side. A part is named by the rank of its first sub-domain. When a part is bisected, its low child keeps the name, so that
-//! only the faces that go to the high child change owner, and neither the neighbor nor its files are read.
+//! A cut's faces are numbered. For each face, the table of the cut has the sub-domains on the low side and on the high
+//! side. A sub-domain is named by the rank of its first final sub-domain. When it is bisected, its low child keeps the
+//! name. So only the faces of the high child change owner, and neither the neighbor nor its files are read.
 //!
 //! Source: the paper, section 1.3.
 
@@ -45,25 +45,26 @@ impl Owners {
         Some(owners[1 - (side as usize & 1)])
     }
 
-    /// The faces of one part, and who has them on the other side.
-    pub fn across(&self, part: u32) -> FacesAcross {
+    /// The faces of one sub-domain, with the owner on the other side of each.
+    pub fn across(&self, part: u32) -> OppositeOwners {
         let faces = (0..).zip(&self.faces);
         let other = |(index, &owners): (u32, &[u32; 2])| match owners {
             [a, b] if a == part => Some([index, b]),
             [a, b] if b == part => Some([index, a]),
             _ => None,
         };
-        FacesAcross { faces: faces.filter_map(other).collect() }
+        OppositeOwners { faces: faces.filter_map(other).collect() }
     }
 }
 
-/// The faces that one part has in a cut. Shape: `faces[i]` = the number of a face and the part on its other side, ascending.
+/// The faces that one sub-domain has in a cut. Shape: `faces[i]` = the number of a face and the sub-domain on its other
+/// side, ascending.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, Default, PartialEq, Eq)]
-pub struct FacesAcross {
+pub struct OppositeOwners {
     faces: Vec<[u32; 2]>,
 }
 
-impl FacesAcross {
+impl OppositeOwners {
     /// Who has the face on the other side; `None` when the part has no such face.
     pub fn other(&self, index: u32) -> Option<u32> {
         let at = self.faces.binary_search_by_key(&index, |face| face[0]);
@@ -73,12 +74,12 @@ impl FacesAcross {
 
 /// Shared faces of each pair of parts, the lower name first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Neighbors {
+pub struct NeighborCounts {
     pairs: BTreeMap<(u32, u32), u64>,
 }
 
-impl Neighbors {
-    /// Sets what a pair shares.
+impl NeighborCounts {
+    /// Sets the number of faces that a pair shares.
     pub fn set(&mut self, a: u32, b: u32, faces: u64) {
         self.pairs.insert((a.min(b), a.max(b)), faces);
     }
@@ -99,8 +100,8 @@ impl Neighbors {
         }
     }
 
-    /// The neighbors of a part by name, and what is shared with each.
-    pub fn of(&self, part: u32) -> Vec<(u32, u64)> {
+    /// The neighbors of a sub-domain by name, and the number of faces shared with each.
+    pub fn list(&self, part: u32) -> Vec<(u32, u64)> {
         let mut found: Vec<(u32, u64)> = (self.pairs.iter())
             .filter_map(|(&(a, b), &n)| match part {
                 p if p == a => Some((b, n)),
@@ -120,7 +121,7 @@ mod tests {
     #[test]
     fn faces_change_owner_and_tables_stay_symmetric() {
         let mut owners = Owners::new(5, 0, 2);
-        let mut neighbors = Neighbors::default();
+        let mut neighbors = NeighborCounts::default();
         neighbors.set(0, 2, 5);
         // The high part is bisected: faces 3 and 4 go to part 3.
         for index in [3, 4] {
@@ -129,8 +130,8 @@ mod tests {
             neighbors.remove(2, other);
             neighbors.add(3, other);
         }
-        assert_eq!(neighbors.of(0), [(2, 3), (3, 2)]);
-        assert_eq!(neighbors.of(3), [(0, 2)]);
+        assert_eq!(neighbors.list(0), [(2, 3), (3, 2)]);
+        assert_eq!(neighbors.list(3), [(0, 2)]);
         assert_eq!(owners.other(4, 0), Some(3));
         let [two, three] = [2, 3].map(|part| owners.across(part));
         assert_eq!((two.other(2), two.other(3)), (Some(0), None));

@@ -150,14 +150,14 @@ impl<'a> Input<'a> {
         for number in 0..self.surface.triangles.len() {
             let sides = [0, 1].map(|side| get(&self.seen[side], number));
             let is_sheet = self.surface.is_sheet(number as u32);
-            let is_fin = self.surface.is_fin(number as u32);
+            let is_support_triangle = self.surface.is_support_triangle(number as u32);
             if sides == [true; 2] || (sides != [false; 2] && !is_sheet) {
-                report.triangles_present += u64::from(!is_fin);
+                report.triangles_present += u64::from(!is_support_triangle);
             } else if is_sheet {
-                report.triangles_missing += u64::from(!is_fin);
+                report.triangles_missing += u64::from(!is_support_triangle);
                 self.report_missing(
                     number,
-                    match is_fin {
+                    match is_support_triangle {
                         true => "holds an embedded edge and has not a tetrahedron on each side",
                         false => "is part of a sheet and has not a tetrahedron on each side",
                     },

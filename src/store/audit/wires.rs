@@ -29,20 +29,20 @@ pub(super) struct SeenWires {
 
 /// Bytes that the search for the edges and points of a surface holds.
 pub fn wire_bytes(surface: &Surface) -> u64 {
-    let wires = &surface.wires;
+    let wires = &surface.embedded;
     BYTES_EACH * (wires.edges.len() + wires.points.len()) as u64
 }
 
 impl<'a> WireSearch<'a> {
     /// None where there is nothing to look for.
     pub fn new(surface: &'a Surface) -> Option<Self> {
-        let wires = &surface.wires;
+        let wires = &surface.embedded;
         let edges = wires.edges.iter().enumerate();
         let ends = wires.edges.iter().flat_map(|&[a, b, _]| [a, b]);
         let mut vertices: HashMap<u32, _> = ends.map(|v| (v, (None, false))).collect();
         let points = wires.points.iter().enumerate();
         vertices.extend(points.map(|(i, &[v, _])| (v, (Some(i), false))));
-        surface.has_wires().then(|| Self {
+        surface.has_embedded().then(|| Self {
             surface,
             edges: edges.map(|(e, &[a, b, _])| ([a.min(b), a.max(b)], (e, false))).collect(),
             vertices,
@@ -96,7 +96,7 @@ impl<'a> WireSearch<'a> {
 
     /// Counts what was seen; names what is missing.
     pub fn finish(self, report: &mut Report) {
-        let wires = &self.surface.wires;
+        let wires = &self.surface.embedded;
         let mut edges = vec![false; wires.edges.len()];
         self.edges.values().for_each(|&(e, is_seen)| edges[e] = is_seen);
         let mut points = vec![false; wires.points.len()];

@@ -3,7 +3,7 @@
 //! A target may answer with any error. It may not panic, hang, or hold more than its input justifies.
 //! Bytes that cannot have been written are also given a valid head and checksum, or only the checksum would be tested.
 
-use tetdb_base::expr::{Expression, Kind};
+use tetdb_base::expr::{ExprKind, Expression};
 use tetdb_base::storage::kind;
 use tetdb_base::surface::{orient_alike, validate};
 use tetdb_engine::pipeline::MeshOptions;
@@ -72,10 +72,10 @@ fn expression(bytes: &[u8]) {
     };
     for values in [[0.0; 3], [1.0, -2.0, 0.5], [1e300, -1e-300, f64::NAN]] {
         match found.kind() {
-            Kind::Number => {
+            ExprKind::Number => {
                 found.number(&values);
             }
-            Kind::Truth => {
+            ExprKind::Truth => {
                 let range = values.map(|x| [x, x]);
                 // What holds at a point may hold around it.
                 assert!(!found.truth(&values) || found.may_hold(&range), "{text}");

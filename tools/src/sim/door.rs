@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
-use tetdb_base::storage::{Disk, Entry, FileId, FileLock, Refused};
+use tetdb_base::storage::{Disk, DiskEntry, FileId, FileLock, Refused};
 
 use super::SimDisk;
 use super::state::{Call, Node, Pending, Told};
@@ -113,7 +113,7 @@ impl Disk for Door {
         Ok(self.backend(file))
     }
 
-    fn open_to_look(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>> {
+    fn open_read_only(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>> {
         self.open(path)
     }
 
@@ -225,11 +225,11 @@ impl Disk for Door {
         Ok(names.filter_map(name).collect())
     }
 
-    fn entry(&self, path: &Path) -> Option<Entry> {
+    fn entry(&self, path: &Path) -> Option<DiskEntry> {
         let state = self.0.lock();
         match state.names.get(path)? {
-            Node::Folder => Some(Entry::Folder),
-            Node::File(f) => Some(Entry::File(state.files[*f].now.len())),
+            Node::Folder => Some(DiskEntry::Folder),
+            Node::File(f) => Some(DiskEntry::File(state.files[*f].now.len())),
         }
     }
 

@@ -4,11 +4,11 @@ use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::geom::HilbertFrame;
-use tetdb_base::storage::{Keyed, Pages, ScratchSpace, raise};
+use tetdb_base::storage::{KeyedId, OrRaise, Pages, ScratchSpace};
 use tetdb_base::surface::Surface;
-use tetdb_kernel::boundary::{RecoveryReport, Regions, fill_regions, recover_watched};
+use tetdb_kernel::boundary::{RecoveryReport, VolumeRegions, fill_regions, recover_with_progress};
 use tetdb_kernel::delaunay::{Kernel, KernelStats, Rejected, enclose, insertion_key};
-use tetdb_kernel::mesh::{Facet, Mesh, SHEET, VertexTag};
+use tetdb_kernel::mesh::{Mesh, MeshFacet, SHEET, VertexTag};
 use tetdb_kernel::optimize;
 use tetdb_schema::word::Word;
 
@@ -20,7 +20,7 @@ pub struct CoarseReport {
     /// What boundary recovery did.
     pub recovery: RecoveryReport,
     /// The volumes and which of them are filled.
-    pub regions: Regions,
+    pub regions: VolumeRegions,
 }
 
 /// Points between two words to the watcher.
@@ -62,7 +62,7 @@ pub fn recovered<P: Pages>(
 ) -> Result<CoarseReport, PipelineError> {
     watch(stage("recover the surface"));
     mesh.refresh_tet_of();
-    let recovery = recover_watched(mesh, &|done, total| {
+    let recovery = recover_with_progress(mesh, &|done, total| {
         watch(Event {
             done,
             total: (total > 0).then_some(total),
@@ -100,19 +100,18 @@ pub fn triangulate<P: Pages>(
 ) -> Result<KernelStats, (u32, Rejected)> {
     let bounds = surface.bounds();
     let frame = HilbertFrame::new(&bounds);
-    let mut order = scratch.sorter::<Keyed>();
+    let mut order = scratch.sorter::<KeyedId>();
     for (i, &p) in (0u32..).zip(&surface.points) {
         let key = insertion_key(&frame, p);
-        let pushed = order.push(Keyed { key, id: i });
-        pushed.unwrap_or_else(|e| raise(e));
+        order.push(KeyedId { key, id: i }).or_raise();
     }
-    let order = order.finish().unwrap_or_else(|e| raise(e));
+    let order = order.finish().or_raise();
     let mut kernel = Kernel::default();
     let mut hint = enclose(mesh, &bounds);
     let total = surface.points.len();
-    let mut number = scratch.column(total, 0u32);
+    let mut number = scratch.vec(total, 0u32);
     for (k, record) in order.enumerate() {
-        let i = record.unwrap_or_else(|e| raise(e)).id;
+        let i = record.or_raise().id;
         let p = surface.points[i as usize];
         let v = mesh.add_vertex(p, 0.0);
         mesh.set_vertex_attribute(v, VertexTag::Surface, i);
@@ -128,7 +127,7 @@ pub fn triangulate<P: Pages>(
         }
     }
     for (n, (corners, &label)) in surface.triangles.iter().zip(&surface.labels).enumerate() {
-        mesh.add_facet(Facet {
+        mesh.add_facet(MeshFacet {
             vertices: corners.map(|c| number.get(c as usize)),
             label,
             input: n as u64,

@@ -50,7 +50,7 @@ impl HeadStart {
 
     /// The mesh, with a place for pages that leave memory and `bytes` for frames, which must hold it.
     pub fn into_mesh(mut self, bytes: u64, backing: Backing) -> (Mesh, KernelStats) {
-        self.mesh.pages_mut().settle(bytes, backing);
+        self.mesh.pages_mut().limit_with_backing(bytes, backing);
         (self.mesh, self.kernel)
     }
 }
@@ -226,7 +226,7 @@ mod tests {
             subdomain: 0,
             generation: 1,
             spill: dir.path().into(),
-            made: None,
+            output: None,
             base: None,
             cache_bytes: 1 << 20,
         };

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::pipeline::tree::blob;
 use crate::pipeline::work::InheritedFace;
-use tetdb_kernel::topology::{Neighbors, Owners};
+use tetdb_kernel::topology::{NeighborCounts, Owners};
 use tetdb_schema::catalog::{NeighborRow, TopologyRow};
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::{Catalog, Step, StoreError};
@@ -26,7 +26,7 @@ pub struct NewCut<'a> {
 pub struct TopologyChange {
     /// By cut.
     owners: BTreeMap<u32, Owners>,
-    neighbors: Neighbors,
+    neighbors: NeighborCounts,
     /// Parts whose rows change.
     names: BTreeSet<u32>,
 }
@@ -64,7 +64,7 @@ impl TopologyChange {
             neighbors.add(high, other);
         }
         // Who was a neighbor of the parent is one of a child: no other row changes.
-        let beside = [low, high].into_iter().flat_map(|name| neighbors.of(name));
+        let beside = [low, high].into_iter().flat_map(|name| neighbors.list(name));
         self.names.extend(beside.map(|n| n.0).chain([low, high]));
         Ok(())
     }
@@ -92,8 +92,8 @@ pub fn read_owners(catalog: &mut Catalog, cut: u32) -> Result<Owners, StoreError
     })
 }
 
-fn neighbors_of(rows: &[TopologyRow]) -> Neighbors {
-    let mut neighbors = Neighbors::default();
+fn neighbors_of(rows: &[TopologyRow]) -> NeighborCounts {
+    let mut neighbors = NeighborCounts::default();
     for row in rows {
         for neighbor in &row.neighbors {
             neighbors.set(row.subdomain, neighbor.subdomain, neighbor.faces);
@@ -102,8 +102,8 @@ fn neighbors_of(rows: &[TopologyRow]) -> Neighbors {
     neighbors
 }
 
-fn topology_row(neighbors: &Neighbors, name: u32) -> TopologyRow {
-    let of = neighbors.of(name).into_iter();
+fn topology_row(neighbors: &NeighborCounts, name: u32) -> TopologyRow {
+    let of = neighbors.list(name).into_iter();
     TopologyRow {
         subdomain: name,
         neighbors: of.map(|(subdomain, faces)| NeighborRow { subdomain, faces }).collect(),

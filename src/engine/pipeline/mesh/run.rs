@@ -235,7 +235,7 @@ impl<'a> Run<'a> {
             subdomain: 0,
             generation: COARSE,
             spill: scratch.clone(),
-            made: None,
+            output: None,
             base: None,
             cache_bytes: self.plan.redb as usize,
         };
@@ -250,8 +250,8 @@ impl<'a> Run<'a> {
             }
         };
         let label_names = surface.label_names.clone();
-        let wires = surface.has_wires().then(|| wires_row(&surface));
-        let n_triangles = surface.n_own_triangles();
+        let wires = surface.has_embedded().then(|| wires_row(&surface));
+        let n_triangles = surface.n_input_triangles();
         // All that is needed from here on is in the mesh.
         drop(surface);
         let report = recovered(&mut mesh, kernel, self.options, self.watch)?;
@@ -403,9 +403,9 @@ impl<'a> Run<'a> {
 
 fn wires_row(surface: &Surface) -> WiresRow {
     WiresRow {
-        edges: surface.wires.edges.clone(),
-        points: surface.wires.points.clone(),
-        fin_first: surface.n_own_triangles() as u64,
+        edges: surface.embedded.edges.clone(),
+        points: surface.embedded.points.clone(),
+        fin_first: surface.n_input_triangles() as u64,
     }
 }
 

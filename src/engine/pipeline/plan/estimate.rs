@@ -8,11 +8,11 @@ use super::regions::{refuse_outer_points, refuse_outer_sheets, region_sizes};
 use super::{MEMORY_MIN, Options, Plan};
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::{ScratchSpace, attempt, join};
-use tetdb_base::surface::{OUTSIDE, Seeker, Surface, VOLUMES_TRIANGLE, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, OUTSIDE, Seeker, Surface, VOLUMES_TRIANGLE};
 use tetdb_kernel::boundary::{BoundaryError, Filled, RegionPolicy};
 use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::{
-    Background, Domain, Further, Region, SizeConstraint, SizeField, SizeSummary, TetCounts,
+    Background, Domain, ExtraSizes, Region, SizeConstraint, SizeField, SizeSummary, TetCounts,
 };
 use tetdb_store::sealed::Form;
 
@@ -151,7 +151,7 @@ fn prepare_in(
         return Err(PipelineError::SizeField { file: file.path.clone() });
     }
     let asked = &options.mesh.sizes;
-    let lone_points = surface.lone_points();
+    let isolated_points = surface.isolated_points();
     let built = |regions: &[Region]| {
         let mut constraints: Vec<&dyn SizeConstraint> =
             regions.iter().map(|r| r as &dyn SizeConstraint).collect();
@@ -161,14 +161,15 @@ fn prepare_in(
             Some(Background::AtVertices(h)) => at_vertices = Some(&h[..]),
             None => {}
         }
-        let further = Further { constraints: &constraints, at_vertices, at_points: &lone_points };
+        let further =
+            ExtraSizes { constraints: &constraints, at_vertices, at_points: &isolated_points };
         SizeField::build_with(&surface.points, &surface.triangles, asked, &further, scratch)
     };
     let enclosed = || {
         // Counted before the tree takes its share of what is left.
-        let _held = scratch.hold(VOLUMES_TRIANGLE * surface.n_triangles());
-        let seeker = Seeker::of(surface, scratch, |_| true);
-        let volumes = Volumes::of_in(&seeker, scratch);
+        let _held = scratch.lease(VOLUMES_TRIANGLE * surface.n_triangles());
+        let seeker = Seeker::with_filter(surface, scratch, |_| true);
+        let volumes = EnclosedVolumes::new_in(&seeker, scratch);
         (seeker, volumes)
     };
     let has_room = scratch.available() >= (ROOM_FOR_BOTH * surface.n_triangles()) as u64;
@@ -180,11 +181,11 @@ fn prepare_in(
     } else {
         // What building takes is given back before the surface's tree is built.
         let early = built(&[])?;
-        let _early = scratch.hold(early.0.octree_bytes());
+        let _early = scratch.lease(early.0.octree_bytes());
         (Some(early), enclosed())
     };
-    let _early = (early.as_ref()).map(|(field, _)| scratch.hold(field.octree_bytes()));
-    let _volumes = scratch.hold(OF_SIDE * surface.n_triangles());
+    let _early = (early.as_ref()).map(|(field, _)| scratch.lease(field.octree_bytes()));
+    let _volumes = scratch.lease(OF_SIDE * surface.n_triangles());
     let chosen = chosen(&seeker, &volumes, options)?;
     refuse_outer_sheets(surface, &volumes, &chosen)?;
     refuse_outer_points(surface, &seeker, &volumes, &chosen)?;
@@ -202,7 +203,11 @@ fn prepare_in(
 }
 
 /// The volumes that are filled. Errors: seeds that say what cannot be.
-fn chosen(seeker: &Seeker, volumes: &Volumes, options: &Options) -> Result<Filled, PipelineError> {
+fn chosen(
+    seeker: &Seeker,
+    volumes: &EnclosedVolumes,
+    options: &Options,
+) -> Result<Filled, PipelineError> {
     let rule = &options.mesh.regions;
     let reach = ON_SURFACE * seeker.surface().bounds().diagonal();
     for seed in &rule.seeds {
@@ -434,7 +439,7 @@ pub fn n_subdomains(tets: f64, options: &Options) -> (u32, Option<u32>) {
 mod tests {
     use super::*;
     use crate::pipeline::plan::MeshOptions;
-    use tetdb_base::surface::{orient_alike_in, validate_in};
+    use tetdb_base::surface::{orient_alike_with, validate_with};
     use tetdb_kernel::samples::SampleSpec;
 
     #[test]
@@ -446,8 +451,8 @@ mod tests {
             MeshOptions { regions: RegionPolicy::All.into(), ..MeshOptions::default() }.into();
         let wide = prepare(&surface, &options, None, &ScratchSpace::boundless())?;
         let narrow = ScratchSpace::new(surface.bytes() as u64 / 4, dir.path());
-        orient_alike_in(&mut surface, &narrow);
-        assert!(validate_in(&surface, &narrow).is_valid());
+        orient_alike_with(&mut surface, &narrow);
+        assert!(validate_with(&surface, &narrow).is_valid());
         let made = prepare(&surface, &options, None, &narrow)?;
         assert_eq!(made.estimate, wide.estimate);
         assert_eq!(made.sizes.to_string(), wide.sizes.to_string());

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::ScratchSpace;
-use tetdb_base::surface::{Seeker, Surface, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface};
 use tetdb_kernel::boundary::Filled;
 use tetdb_kernel::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError};
 
@@ -80,7 +80,7 @@ fn unknown(which: &str, surface: &Surface, n_regions: usize) -> SizingError {
 /// Errors: a sheet, or an edge of a wire, where nothing is filled.
 pub(super) fn refuse_outer_sheets(
     surface: &Surface,
-    volumes: &Volumes,
+    volumes: &EnclosedVolumes,
     chosen: &Filled,
 ) -> Result<(), PipelineError> {
     let is_outer =
@@ -90,7 +90,7 @@ pub(super) fn refuse_outer_sheets(
         return Ok(());
     };
     let [a, b, c] = surface.corners(triangle);
-    if surface.is_fin(triangle) {
+    if surface.is_support_triangle(triangle) {
         return Err(PipelineError::WireOutside {
             what: "edges",
             label: surface.label_name(triangle).to_owned(),
@@ -110,10 +110,10 @@ pub(super) fn refuse_outer_sheets(
 pub(super) fn refuse_outer_points(
     surface: &Surface,
     seeker: &Seeker,
-    volumes: &Volumes,
+    volumes: &EnclosedVolumes,
     chosen: &Filled,
 ) -> Result<(), PipelineError> {
-    let wires = &surface.wires;
+    let wires = &surface.embedded;
     let alone = (wires.points.iter().zip(&wires.sizes)).filter(|(_, size)| **size > 0.0);
     let is_outer =
         |&v: &u32| !(chosen.volumes).contains(&volumes.at(seeker, surface.points[v as usize]));

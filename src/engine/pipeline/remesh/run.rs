@@ -63,7 +63,7 @@ impl Job {
                 subdomain: rank,
                 generation,
                 spill: scratch.clone(),
-                made: None,
+                output: None,
                 base: None,
                 cache_bytes: share.redb as usize,
             };

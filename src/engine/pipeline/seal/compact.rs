@@ -16,7 +16,7 @@ use super::target::SealTarget;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::geom::HilbertFrame;
-use tetdb_base::storage::{Keyed, Pages, Sorted, Sorter, check_cancelled, kind};
+use tetdb_base::storage::{KeyedId, Pages, Sorted, Sorter, check_cancelled, kind};
 use tetdb_kernel::mesh::anatomy::FACES;
 use tetdb_kernel::mesh::{Mesh, Scan, VertexTag, dense, scan_parts, tets_of_page};
 use tetdb_store::sealed::{Form, Sealed, SealedWriter, sorted_face};
@@ -66,7 +66,7 @@ fn vertices<P: Pages>(
             continue;
         }
         let key = frame.index(mesh.point(v));
-        sorter.push(Keyed { key, id: v })?;
+        sorter.push(KeyedId { key, id: v })?;
     }
     for (local, record) in sorter.finish()?.enumerate() {
         let v = record?.id;

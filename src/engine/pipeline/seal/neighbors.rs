@@ -98,7 +98,7 @@ mod tests {
                 subdomain: row.rank,
                 generation: row.generation + 1,
                 spill: dir.path().into(),
-                made: None,
+                output: None,
                 base: Some(StoreFile::open_repaired(&path, 1 << 20, false)?),
                 cache_bytes: 1 << 20,
             };

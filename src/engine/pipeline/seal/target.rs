@@ -6,7 +6,7 @@ use tetdb_schema::ids::SubdomainId;
 
 use tetdb_base::geom::Aabb;
 use tetdb_base::storage::DiskPath;
-use tetdb_kernel::topology::FacesAcross;
+use tetdb_kernel::topology::OppositeOwners;
 use tetdb_store::sealed::Form;
 
 /// Where and how to seal.
@@ -20,5 +20,5 @@ pub struct SealTarget<'a> {
     pub memory: u64,
     pub bounds: Aabb,
     /// Who has the other side of its interface faces, by cut; without them interface faces are left out.
-    pub owners: Option<&'a BTreeMap<u32, FacesAcross>>,
+    pub owners: Option<&'a BTreeMap<u32, OppositeOwners>>,
 }

@@ -108,7 +108,7 @@ mod tests {
     use super::*;
     use tetdb_base::geom::{Aabb, HilbertFrame, Point};
     use tetdb_kernel::delaunay::{Kernel, enclose};
-    use tetdb_kernel::mesh::{FaceRef, Facet, InterfaceFace, VertexTag, renumber};
+    use tetdb_kernel::mesh::{FaceRef, MeshFacet, MeshInterfaceFace, VertexTag, renumber};
     use tetdb_schema::record::{CoarseTet, CoarseVertex};
 
     /// A random Delaunay mesh numbered along the curve, with tags, regions, flags, required faces and faces of both kinds.
@@ -137,13 +137,18 @@ mod tests {
         }
         for i in 0..300 {
             let vertices = [i, i + 1, i + 2];
-            mesh.add_facet(Facet {
+            mesh.add_facet(MeshFacet {
                 vertices,
                 label: i % 4,
                 input: u64::from(i) << 30,
                 regions: [1, 0],
             });
-            mesh.add_interface_face(InterfaceFace { vertices, cut: 2, index: 3 * i, side: i & 1 });
+            mesh.add_interface_face(MeshInterfaceFace {
+                vertices,
+                cut: 2,
+                index: 3 * i,
+                side: i & 1,
+            });
         }
         renumber(&mut mesh, &HilbertFrame::new(&bounds), space).expect("room for runs");
         mesh
@@ -164,7 +169,7 @@ mod tests {
                 subdomain: 3,
                 generation: 8,
                 spill: scratch.clone(),
-                made: None,
+                output: None,
                 base: None,
                 cache_bytes: 1 << 20,
             };
@@ -214,7 +219,7 @@ mod tests {
                 subdomain: 0,
                 generation: 2,
                 spill: scratch.clone(),
-                made: None,
+                output: None,
                 base: None,
                 cache_bytes: 1 << 20,
             };

@@ -14,7 +14,7 @@ use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::{Event, Watcher};
 use crate::pipeline::tree::{DONE, PartMesh, TreePart, open_part};
 use tetdb_base::storage::{Backing, DiskPath, Pager, PagerStats, attempt};
-use tetdb_kernel::bisect::{self, CutPlan, CutReport, Opened, Zone};
+use tetdb_kernel::bisect::{self, CutPlan, CutReport, OpenCut, Zone};
 use tetdb_kernel::mesh::{Mesh, Workspace};
 use tetdb_kernel::optimize::Settings;
 use tetdb_schema::catalog::Stage;
@@ -131,7 +131,7 @@ impl CutJob<'_> {
     fn child(
         &self,
         (host, core): (&mut Mesh, &mut Mesh),
-        opened: &Opened,
+        opened: &OpenCut,
         (part, path): (TreePart, &DiskPath),
         space: &Workspace,
     ) -> Result<(Child, PagerStats), PipelineError> {
@@ -172,7 +172,7 @@ impl CutJob<'_> {
             subdomain,
             generation: self.order.parent.generation + DONE,
             spill: self.scratch.clone(),
-            made,
+            output: made,
             base: None,
             cache_bytes: (self.share.redb / share) as usize,
         }

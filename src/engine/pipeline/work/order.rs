@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rkyv::{Archive, Deserialize, Serialize};
 
 use crate::pipeline::tree::{PartMesh, ZoneRow};
-use tetdb_kernel::topology::FacesAcross;
+use tetdb_kernel::topology::OppositeOwners;
 use tetdb_store::store::Catalog;
 
 /// One unit of work.
@@ -43,5 +43,5 @@ pub struct SubdomainOrder {
     /// Of the cuts above it, from the top.
     pub zones: Vec<ZoneRow>,
     /// Who has the other side of its interface faces, by cut.
-    pub owners: BTreeMap<u32, FacesAcross>,
+    pub owners: BTreeMap<u32, OppositeOwners>,
 }

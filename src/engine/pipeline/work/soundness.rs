@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::{DiskPath, Pages, StorageError, attempt};
 use tetdb_kernel::mesh::{FaceRef, Mesh};
-use tetdb_kernel::topology::FacesAcross;
+use tetdb_kernel::topology::OppositeOwners;
 use tetdb_schema::page::{RECORDS, SLOT_MASK};
 use tetdb_store::sealed::SealedError;
 
@@ -43,7 +43,7 @@ fn damaged((base, part): (&DiskPath, u32), what: &str) -> PipelineError {
 /// Looks at the mesh of a part before work begins. Errors: damage, a face between sub-domains that nobody has beyond.
 pub fn check_owners<P: Pages>(
     mesh: &mut Mesh<P>,
-    owners: &BTreeMap<u32, FacesAcross>,
+    owners: &BTreeMap<u32, OppositeOwners>,
     place: (&DiskPath, u32),
 ) -> Result<(), PipelineError> {
     let all = (0..mesh.n_interface_faces()).map(|n| mesh.interface_face(n));
@@ -109,10 +109,10 @@ mod tests {
     use tetdb_base::geom::{Aabb, Point};
     use tetdb_base::storage::FlatPages;
     use tetdb_kernel::delaunay::enclose;
-    use tetdb_kernel::mesh::InterfaceFace;
+    use tetdb_kernel::mesh::MeshInterfaceFace;
 
-    fn face(vertices: [u32; 3]) -> InterfaceFace {
-        InterfaceFace { vertices, cut: 2, index: 43, side: 0 }
+    fn face(vertices: [u32; 3]) -> MeshInterfaceFace {
+        MeshInterfaceFace { vertices, cut: 2, index: 43, side: 0 }
     }
 
     #[test]

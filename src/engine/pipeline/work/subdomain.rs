@@ -21,7 +21,7 @@ use tetdb_base::storage::{Backing, DiskPath, PagerStats, attempt};
 use tetdb_kernel::bisect::Zone;
 use tetdb_kernel::mesh::{Mesh, Workspace};
 use tetdb_kernel::sizing::{SizeField, TETS_PER_LOAD};
-use tetdb_kernel::topology::FacesAcross;
+use tetdb_kernel::topology::OppositeOwners;
 use tetdb_schema::catalog::{CoarseRow, StoreState};
 use tetdb_store::sealed::{Form, Sealed};
 
@@ -41,7 +41,7 @@ pub struct SubdomainJob {
     pub scratch: DiskPath,
     pub zones: Vec<Zone>,
     /// Who has the other side of the faces around it, by cut.
-    pub owners: BTreeMap<u32, FacesAcross>,
+    pub owners: BTreeMap<u32, OppositeOwners>,
     pub share: Plan,
 }
 
@@ -69,7 +69,7 @@ impl SubdomainJob {
                 subdomain: part.part.first,
                 generation,
                 spill: scratch.clone(),
-                made: None,
+                output: None,
                 base: None,
                 cache_bytes: share.redb as usize,
             };

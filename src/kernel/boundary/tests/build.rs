@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::delaunay::{Kernel, enclose, insertion_key};
-use crate::mesh::{FaceRef, Facet, Mesh, VertexTag};
+use crate::mesh::{FaceRef, Mesh, MeshFacet, VertexTag};
 use tetdb_base::geom::{Aabb, HilbertFrame, Point, orient};
 use tetdb_base::storage::{FlatPages, Pages};
 
@@ -25,7 +25,7 @@ pub fn delaunay(points: &[Point], triangles: &[[u32; 3]]) -> Mesh<FlatPages> {
         id[i as usize] = v;
     }
     for (n, t) in triangles.iter().enumerate() {
-        mesh.add_facet(Facet {
+        mesh.add_facet(MeshFacet {
             vertices: t.map(|i| id[i as usize]),
             label: 0,
             input: n as u64,

@@ -1,4 +1,4 @@
-//! Components told page by page are those that a walk from tetrahedron to tetrahedron finds.
+//! Components found page by page equal those of a walk from tetrahedron to tetrahedron.
 
 use super::build::delaunay;
 use super::shapes::{cube, joined, placed};
@@ -46,7 +46,7 @@ fn walked(mesh: &mut Mesh<FlatPages>) -> (Vec<u32>, Vec<(f64, u32)>) {
 
 #[test]
 fn components_across_pages_are_those_that_a_walk_finds() {
-    // A shell in a shell, and eleven cubes beside each other in the inner one.
+    // A shell in a shell, and eleven cubes side by side in the inner one.
     let solid = cube(12, |x, y, _| (x + y).is_multiple_of(2));
     let small = cube(2, |_, _, _| true);
     let mut parts = vec![

@@ -5,14 +5,16 @@
 
 use std::cmp::Ordering;
 
-use crate::boundary::exact::{ExactPoint, Placed, orient_filtered, orient_in_pairs, orient_placed};
+use crate::boundary::exact::{
+    ExactPoint, PlacedPoint, orient_filtered, orient_in_pairs, orient_placed,
+};
 use tetdb_base::geom::Dyadic;
 use tetdb_base::geom::Point;
-use truth::{Exact, Numbers, Truth, cases, exact, orient_truth};
+use truth::{Exact, RandomNumbers, Truth, cases, exact, orient_truth};
 
 /// The exact numbers that the signs of the crate below are tested against.
 #[allow(dead_code, reason = "spheres are tested in the crate below")]
-#[path = "../../../base/geom/oracle.rs"]
+#[path = "../../../base/geom/tests/oracle.rs"]
 mod truth;
 
 /// `base + Σ share · (to - base)`.
@@ -30,7 +32,7 @@ fn combination(base: Point, shares: &[(Point, f64)]) -> Exact {
 
 #[test]
 fn orientations_of_exact_points_are_those_of_exact_numbers() {
-    let mut numbers = Numbers(11);
+    let mut numbers = RandomNumbers(11);
     let mut seen = [0u32; 3];
     let mut n_in_pairs = 0;
     for k in 0..cases() {
@@ -70,7 +72,7 @@ fn orientations_of_exact_points_are_those_of_exact_numbers() {
             })
             .collect();
         let placed =
-            [0, 1, 2, 3].map(|i| Placed { point: shapes[i].0, exact: shapes[i].1.as_ref() });
+            [0, 1, 2, 3].map(|i| PlacedPoint { point: shapes[i].0, exact: shapes[i].1.as_ref() });
         let truth = orient_truth(&[0, 1, 2, 3].map(|i| shapes[i].2.clone()));
         let in_pairs = orient_in_pairs(placed);
         n_in_pairs += u32::from(in_pairs.is_some() && orient_filtered(placed).is_none());

@@ -1,4 +1,4 @@
-//! Made surfaces with known difficulties.
+//! Generated surfaces with known difficulties.
 
 use super::build::{check, check_facets, delaunay};
 use crate::boundary::{RecoveryReport, recover};
@@ -353,7 +353,7 @@ fn fans_of_hundreds_of_slats_are_turned_edge_by_edge() {
         let (points, triangles) = twisted(n, 0.0, 0.2);
         let report = recovered(&format!("fan {n}"), &points, &triangles);
         assert_eq!(report.points_on_surface, 0, "{n}: {report:?}");
-        // From the hub on, an edge is turned once; from the rim it was thirteen times.
+        // From the hub, an edge is turned once; from the outline it was turned thirteen times.
         let flips_max = if n < 1000 { 8 } else { 2 };
         let n_facets = u64::from(report.facets);
         assert!(report.flips < flips_max * n_facets, "{n}: {report:?}");

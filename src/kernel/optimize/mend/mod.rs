@@ -179,7 +179,7 @@ impl Mender {
         let mut left = stage.tried_max(mesh.n_tets());
         self.window.clear();
         loop {
-            self.look_ahead(mesh, stage);
+            self.evaluate_speculatively(mesh, stage);
             let Some((bits, t)) = self.queue.pop() else {
                 break;
             };
@@ -239,7 +239,7 @@ impl Mender {
     }
 
     /// Tries the next ones in the queue on all threads.
-    fn look_ahead<P: Pages>(&mut self, mesh: &mut Mesh<P>, stage: &Stage) {
+    fn evaluate_speculatively<P: Pages>(&mut self, mesh: &mut Mesh<P>, stage: &Stage) {
         let room = self.window.room();
         if room == 0 {
             return;

@@ -9,7 +9,7 @@ use super::refill::Refill;
 use super::stages::Stage;
 use super::star::{Aim, Goal};
 use super::vertex::{BALL_MAX, Mover};
-use crate::mesh::{Draft, Mesh, Tet, Trial};
+use crate::mesh::{DraftState, Mesh, Speculation, Tet};
 use tetdb_base::geom::Point;
 use tetdb_base::shape::quality;
 use tetdb_base::storage::Pages;
@@ -249,7 +249,7 @@ pub(super) struct Attacks<'a> {
     pub(super) stage: &'a Stage,
 }
 
-impl Trial for Attacks<'_> {
+impl Speculation for Attacks<'_> {
     type Item = u32;
     type Scratch = Operator;
     type Outcome = Outcome;
@@ -259,12 +259,12 @@ impl Trial for Attacks<'_> {
         operator: &mut Operator,
         mesh: &mut Mesh<P>,
         &t: &u32,
-    ) -> Option<(Outcome, Draft)> {
+    ) -> Option<(Outcome, DraftState)> {
         let tet = mesh.tet(t);
         let outcome = operator.try_all(mesh, t, &tet, self.stage);
         let left = match outcome {
-            Outcome::Reconnection(_) => Draft::Used,
-            _ => Draft::Unchanged,
+            Outcome::Reconnection(_) => DraftState::Used,
+            _ => DraftState::Unchanged,
         };
         Some((outcome, left))
     }

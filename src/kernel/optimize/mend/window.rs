@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::operator::{Attacks, Operator, Outcome};
-use crate::mesh::{Foreseen, Mesh, look_ahead};
+use crate::mesh::{Evaluated, Mesh, evaluate_speculatively};
 use tetdb_base::storage::{Pages, spare_threads};
 
 /// Tried ahead for each thread at once. One in twenty has to be tried again, for something changed beside it; with sixteen one in seven.
@@ -17,7 +17,7 @@ const LEAST: usize = 2;
 #[derive(Default)]
 pub(super) struct Window {
     /// Of those whose turn has not come yet; nothing where it is not known.
-    foreseen: HashMap<u32, Option<Foreseen<Outcome>>>,
+    foreseen: HashMap<u32, Option<Evaluated<Outcome>>>,
     changed: HashSet<u32>,
 }
 
@@ -43,7 +43,7 @@ impl Window {
             return;
         }
         operators.resize_with(spare_threads(), Operator::ahead);
-        let foreseen = look_ahead(mesh, tets, operators, attacks);
+        let foreseen = evaluate_speculatively(mesh, tets, operators, attacks);
         (self.foreseen).extend(tets.iter().copied().zip(foreseen));
     }
 

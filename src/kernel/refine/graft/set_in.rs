@@ -8,7 +8,7 @@ use super::super::report::RefineReport;
 use super::super::worker::Worker;
 use super::claims::Claim;
 use super::piece::{OPEN, OuterFace, Piece, Place, Use};
-use crate::delaunay::{Located, insertion_key};
+use crate::delaunay::{PointLocation, insertion_key};
 use crate::mesh::anatomy::mark::{EXAMINED, IN_CAVITY};
 use crate::mesh::anatomy::{FACES, MARK};
 use crate::mesh::{FaceRef, Mesh, Tet};
@@ -320,7 +320,7 @@ fn find<P: Pages>(
     mesh: &mut Mesh<P>,
     p: Point,
     claims: &[Claim],
-) -> Option<Located> {
+) -> Option<PointLocation> {
     if let Ok(located) = worker.kernel.locate(mesh, p, worker.last) {
         return Some(located);
     }

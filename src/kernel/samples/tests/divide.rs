@@ -4,12 +4,12 @@ use crate::samples::SampleSpec;
 use tetdb_base::geom::mix;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::ScratchSpace;
+use tetdb_base::surface::EmbeddedSet;
 use tetdb_base::surface::Surface;
-use tetdb_base::surface::WireSet;
 use tetdb_base::surface::{orient_alike, validate};
 
-fn set(points: &[[f64; 3]], edges: &[[u32; 2]]) -> WireSet {
-    WireSet {
+fn set(points: &[[f64; 3]], edges: &[[u32; 2]]) -> EmbeddedSet {
+    EmbeddedSet {
         points: points.iter().map(|&p| Point::from_array(p)).collect(),
         edges: edges.iter().map(|&[a, b]| [a, b, 0]).collect(),
         marks: (0..points.len() as u32).map(|v| [v, 0]).collect(),
@@ -25,8 +25,8 @@ fn unit_box() -> Surface {
 
 /// As a store has it.
 fn in_order(surface: &Surface) -> Surface {
-    let set = surface.wire_set();
-    let mut plain = surface.without_wires();
+    let set = surface.embedded_set();
+    let mut plain = surface.without_embedded();
     plain.sheets_last();
     plain.embed_named(&set, &ScratchSpace::boundless()).expect("as before");
     plain
@@ -34,7 +34,7 @@ fn in_order(surface: &Surface) -> Surface {
 
 #[test]
 fn vertices_on_triangles_become_theirs_and_the_surface_stays() {
-    let room = ScratchSpace::boundless();
+    let scratch = ScratchSpace::boundless();
     let mut surface = unit_box();
     let whole = surface.clone();
     let [low, high] = [whole.bounds().low, whole.bounds().high];
@@ -49,10 +49,10 @@ fn vertices_on_triangles_become_theirs_and_the_surface_stays() {
     points.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
     points.dedup();
     let set = set(&points, &[]);
-    let n = surface.divide_at(&set, &room).expect("few triangles");
+    let n = surface.divide_at(&set, &scratch).expect("few triangles");
     assert!(n > 200 && surface.n_vertices() == whole.n_vertices() + n);
-    surface.embed_wires(&set, "in", &room).expect("each is a vertex");
-    assert!(surface.lone_points().is_empty());
+    surface.embed_set(&set, "in", &scratch).expect("each is a vertex");
+    assert!(surface.isolated_points().is_empty());
     let found = validate(&surface);
     assert!(found.is_valid(), "{:?}", found.defects.first());
     let area = |s: &Surface| -> f64 {
@@ -67,28 +67,28 @@ fn vertices_on_triangles_become_theirs_and_the_surface_stays() {
     let names = |s: &Surface| s.label_names[..whole.label_names.len()].to_vec();
     assert_eq!(names(&surface), names(&whole));
     assert!(orient_alike(&mut surface.clone()).flipped.is_empty());
-    // What is read again from a store is the same to the last number.
+    // A surface read again from a store is identical.
     let again = in_order(&surface);
     assert_eq!(in_order(&again), again);
-    assert_eq!(again.wires.points.len(), points.len());
+    assert_eq!(again.embedded.points.len(), points.len());
 }
 
 #[test]
 fn a_vertex_beside_a_triangle_divides_nothing_and_is_refused_with_its_distance() {
-    let room = ScratchSpace::boundless();
+    let scratch = ScratchSpace::boundless();
     let mut surface = unit_box();
     let bounds = surface.bounds();
     let (middle, beside) = (bounds.low.midpoint(bounds.high), bounds.high.z.next_down());
     let set = set(&[[middle.x + 0.1, middle.y + 0.01, beside]], &[]);
-    assert_eq!(surface.divide_at(&set, &room).expect("nothing to do"), 0);
-    let error = surface.embed_wires(&set, "in", &room);
+    assert_eq!(surface.divide_at(&set, &scratch).expect("nothing to do"), 0);
+    let error = surface.embed_set(&set, "in", &scratch);
     let text = error.expect_err("too near").to_string();
     assert!(text.contains("can be meshed: 1.1e-16 from it"), "{text}");
 }
 
 #[test]
 fn edges_along_edges_of_triangles_are_divided_with_them() {
-    let room = ScratchSpace::boundless();
+    let scratch = ScratchSpace::boundless();
     let mut surface = unit_box();
     let Aabb { low, high } = surface.bounds();
     let at = |share: [f64; 3]| (low + (high - low) * Point::from_array(share)).to_array();
@@ -104,12 +104,12 @@ fn edges_along_edges_of_triangles_are_divided_with_them() {
         .map(at),
         &[[0, 2], [2, 1], [3, 4]],
     );
-    assert_eq!(surface.divide_at(&set, &room).expect("few"), 3);
-    surface.embed_wires(&set, "in", &room).expect("vertices");
+    assert_eq!(surface.divide_at(&set, &scratch).expect("few"), 3);
+    surface.embed_set(&set, "in", &scratch).expect("vertices");
     let (fine, _) = tetdb_base::surface::split(&surface, &|_| 0.04, u64::MAX).expect("few");
     let fine = in_order(&fine);
-    assert!(validate(&fine).is_valid() && fine.n_own_triangles() > 400);
-    assert_eq!(fine.wires.points.len(), 5);
+    assert!(validate(&fine).is_valid() && fine.n_input_triangles() > 400);
+    assert_eq!(fine.embedded.points.len(), 5);
     let own = |e: &[u32; 3]| fine.triangles.iter().any(|t| t.contains(&e[0]) && t.contains(&e[1]));
-    assert!(fine.wires.edges.len() == 4 && fine.wires.edges.iter().all(own));
+    assert!(fine.embedded.edges.len() == 4 && fine.embedded.edges.iter().all(own));
 }

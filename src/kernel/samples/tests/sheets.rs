@@ -3,7 +3,7 @@
 use crate::samples::SampleSpec;
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::Surface;
-use tetdb_base::surface::{Seeker, Volumes, validate};
+use tetdb_base::surface::{EnclosedVolumes, Seeker, validate};
 
 fn sample(word: &str) -> Surface {
     let spec = SampleSpec::parse(word).expect("a sample");
@@ -23,7 +23,7 @@ fn a_large_surface_with_sheets_embedded_is_the_sample_it_was_taken_from() {
     let found = validate(&again);
     assert!(found.is_valid() && found.closedness.n_free > 0);
     // Sheets part nothing.
-    assert_eq!(Volumes::of(&Seeker::new(&again)).n_volumes, 2);
+    assert_eq!(EnclosedVolumes::new(&Seeker::new(&again)).n_volumes, 2);
 }
 
 #[test]

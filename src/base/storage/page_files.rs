@@ -1,4 +1,4 @@
-//! The files behind a pool: where pages come from, and where they go that leave memory.
+//! The files of a pool: the base that pages are read from, the output, and the scratch file for evicted pages.
 
 use tetdb_schema::page::{
     PageAddress, Slot, check_page, open_page, page_key, seal_page, stored_bytes,
@@ -8,7 +8,7 @@ use super::page_table::{IN_BASE, IN_SPILL};
 use super::spill::Spill;
 use super::{DiskPath, StorageError, StoreFile, kind};
 
-/// What a pool begins with, and what it is to make.
+/// The files a pool starts from and the file it writes.
 pub struct Backing {
     /// Rank of the sub-domain whose pages these are.
     pub subdomain: u32,
@@ -17,7 +17,7 @@ pub struct Backing {
     /// Folder of the scratch file for pages that leave memory; it must exist by then.
     pub spill: DiskPath,
     /// The file to make of this generation, where each page is written once: all but those of the scratch map go there instead.
-    pub made: Option<DiskPath>,
+    pub output: Option<DiskPath>,
     /// The generation this step started from.
     pub base: Option<StoreFile>,
     /// Bytes redb may cache for a file that is written; half as many for one that is read.
@@ -26,18 +26,18 @@ pub struct Backing {
 
 /// Files as they are opened: a place is one of the page table's, `IN_BASE`, `IN_OUTPUT` or one in the spill.
 #[derive(Default)]
-pub(super) struct Places {
+pub(super) struct PageFiles {
     backing: Option<Backing>,
-    made: Option<StoreFile>,
+    output: Option<StoreFile>,
     spill: Option<Spill>,
 }
 
-impl Places {
+impl PageFiles {
     pub fn new(backing: Option<Backing>) -> Self {
         Self { backing, ..Self::default() }
     }
 
-    /// Whether there are any.
+    /// Returns whether the pool has files.
     pub fn exist(&self) -> bool {
         self.backing.is_some()
     }
@@ -46,9 +46,9 @@ impl Places {
         self.backing.as_ref().map_or(0, |b| b.subdomain)
     }
 
-    /// Whether pages of this kind go to the output file.
+    /// Returns whether pages of this kind go to the output file.
     pub fn goes_to_output(&self, kind: usize) -> bool {
-        kind != kind::SCRATCH && self.backing.as_ref().is_some_and(|b| b.made.is_some())
+        kind != kind::SCRATCH && self.backing.as_ref().is_some_and(|b| b.output.is_some())
     }
 
     fn backing(&self) -> &Backing {
@@ -75,7 +75,7 @@ impl Places {
         }
         let file = match place {
             IN_BASE => self.backing.as_mut().and_then(|b| b.base.as_mut()),
-            _ => self.made.as_mut(),
+            _ => self.output.as_mut(),
         };
         let file = file.expect("a page that is not resident is in a file");
         let key = page_key(address.kind, address.page);
@@ -123,7 +123,7 @@ impl Places {
         self.spill.as_ref().map_or(0, |spill| spill.end)
     }
 
-    /// Makes a frame what is written of it.
+    /// Prepares a frame for writing.
     pub fn seal(&self, address: PageAddress, frame: &mut [Slot]) {
         seal_page(frame, address, self.backing().generation);
     }
@@ -133,13 +133,13 @@ impl Places {
         &mut self,
         pages: impl Iterator<Item = (PageAddress, &'a [Slot])>,
     ) -> Result<(), StorageError> {
-        if self.made.is_none() {
+        if self.output.is_none() {
             let backing = self.backing();
-            let path = backing.made.as_ref().expect("it makes a file");
-            self.made = Some(StoreFile::create_unsynced(path, backing.cache_bytes)?);
+            let path = backing.output.as_ref().expect("it makes a file");
+            self.output = Some(StoreFile::create_unsynced(path, backing.cache_bytes)?);
         }
-        let made = self.made.as_mut().expect("just created");
-        made.write(pages.map(|(address, frame)| {
+        let output = self.output.as_mut().expect("just created");
+        output.write(pages.map(|(address, frame)| {
             let key = page_key(address.kind, address.page);
             (key, stored_bytes(frame))
         }))
@@ -148,18 +148,18 @@ impl Places {
     /// Begins a file at `path` for all pages there are.
     pub fn begin_file(&mut self, path: DiskPath) {
         let backing = self.backing.as_mut().expect("a pool with a store");
-        let before = backing.made.replace(path);
+        let before = backing.output.replace(path);
         assert!(before.is_none(), "its pages are in the file it makes");
     }
 
     /// Closes the output file, with all pages in it, and goes on from it as `generation`. Errors: the disk.
     pub fn end_file(&mut self, generation: u32) -> Result<(), StorageError> {
         self.spill = None;
-        if let Some(made) = self.made.take() {
-            made.compact()?;
+        if let Some(output) = self.output.take() {
+            output.compact()?;
         }
         let backing = self.backing.as_mut().expect("a pool with a store");
-        let path = backing.made.take().expect("begun");
+        let path = backing.output.take().expect("begun");
         backing.generation = generation;
         let base = StoreFile::open_repaired(path, backing.cache_bytes / 2, false)?;
         backing.base = Some(base);

@@ -1,8 +1,8 @@
-//! Which side of the cut each tetrahedron of the core is on, and what that costs.
+//! The side of the cut that each tetrahedron of the core is on, and the cost of the interface.
 
 use std::collections::BTreeSet;
 
-use super::core::{CoreBoundary, is_in_core, middle, place, tet_ids};
+use super::core::{CoreBoundary, is_in_core, middle, sides_and_distance, tet_ids};
 use super::surface::CuttingSurface;
 use crate::mesh::{FaceRef, Mesh, Tet, dense};
 use tetdb_base::geom::Point;
@@ -17,80 +17,80 @@ const FREE: f64 = 1.4;
 const HIGH: u8 = 1;
 const MAY_CHANGE: u8 = 2;
 
-/// Which side each tetrahedron of the core is on, and whether it may go to the other. Memory: a byte for each.
-pub(super) struct Labels {
+/// The side of each tetrahedron of the core, and whether it may change. Memory: one byte each.
+pub(super) struct SideLabels {
     /// By id.
-    of: Vec<u8>,
+    by_tet: Vec<u8>,
 }
 
-impl Labels {
+impl SideLabels {
     /// Labels every tetrahedron by the side of its middle; lists those of the cutting zone, in id order.
     ///
-    /// At the rim the side is that of the rim face: the tetrahedron beyond has all its vertices there.
-    pub(super) fn begin<P: Pages>(
+    /// At the core boundary the side is that of the core boundary face: the tetrahedron beyond has all its vertices there.
+    pub fn new<P: Pages>(
         core: &mut Mesh<P>,
         surface: &impl CuttingSurface,
-        rim: &CoreBoundary,
+        core_boundary: &CoreBoundary,
     ) -> (Self, Vec<u32>) {
-        let mut of = vec![0; core.tet_ids_end() as usize];
+        let mut by_tet = vec![0; core.tet_ids_end() as usize];
         let mut free = Vec::new();
         for t in tet_ids(core) {
             let tet = core.tet(t);
             if !tet.is_live() {
                 continue;
             }
-            let (sides, least) = place(core, &tet, surface);
+            let (sides, least) = sides_and_distance(core, &tet, surface);
             let mut high = surface.distance(middle(core, &tet)) >= 0.0;
             let mut may_change = sides.crosses() || least <= FREE;
             for i in 0..4 {
-                if !tet.neighbor[i].exists() && rim.find(tet.face(i)).is_some() {
+                if !tet.neighbor[i].exists() && core_boundary.find(tet.face(i)).is_some() {
                     may_change = false;
                     high = surface.distance(core.point(tet.face(i)[0])) >= 0.0;
                 }
             }
             if !sides.crosses() {
-                // A middle that rounds to the other side must not tell another side than its vertices.
+                // A middle that rounds to the other side must not contradict its vertices.
                 high = sides.high;
             }
             if may_change {
                 free.push(t);
             }
             let label = if high { HIGH } else { 0 } | if may_change { MAY_CHANGE } else { 0 };
-            of[t as usize] = label;
+            by_tet[t as usize] = label;
             if t & 1023 == 0 {
                 check_cancelled();
             }
         }
-        (Self { of }, free)
+        (Self { by_tet }, free)
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> u64 {
-        self.of.len() as u64
+    pub fn bytes(&self) -> u64 {
+        self.by_tet.len() as u64
     }
 
-    /// Which side `t` is on: `true` for the high one.
+    /// Side of `t`: `true` for the high one.
     #[inline]
-    pub(super) fn is_high(&self, t: u32) -> bool {
-        self.of[t as usize] & HIGH != 0
+    pub fn is_high(&self, t: u32) -> bool {
+        self.by_tet[t as usize] & HIGH != 0
     }
 
-    /// Whether `t` may go to either side.
+    /// Returns whether `t` may go to either side.
     #[inline]
-    pub(super) fn is_free(&self, t: u32) -> bool {
-        self.of[t as usize] & MAY_CHANGE != 0
+    pub fn is_free(&self, t: u32) -> bool {
+        self.by_tet[t as usize] & MAY_CHANGE != 0
     }
 
     /// Puts `t` on a side.
     #[inline]
-    pub(super) fn set_high(&mut self, t: u32, high: bool) {
-        let label = &mut self.of[t as usize];
+    pub fn set_high(&mut self, t: u32, high: bool) {
+        let label = &mut self.by_tet[t as usize];
         *label = if high { *label | HIGH } else { *label & !HIGH };
     }
 
     /// Faces of the interface at `tet`: local numbers.
     #[inline]
-    pub(super) fn interface_faces(&self, t: u32, tet: &Tet) -> impl Iterator<Item = usize> + use<> {
+    pub fn interface_faces(&self, t: u32, tet: &Tet) -> impl Iterator<Item = usize> + use<> {
         let high = self.is_high(t);
         let mut found = [false; 4];
         for (i, across) in tet.neighbor.into_iter().enumerate() {
@@ -108,7 +108,7 @@ pub(super) fn triangle_quality([a, b, c]: [Point; 3]) -> f64 {
     x.max(y).max(z) / (2.0 * 3f64.sqrt() * inradius.max(f64::MIN_POSITIVE))
 }
 
-/// Greatest shape term of a face: what is worse than this is all the same.
+/// Greatest shape term of a face; worse shapes cost the same.
 const SHAPE_MAX: f64 = 20.0;
 
 /// Cost of a face on the interface: 1, and more for a bad shape or a slope.
@@ -119,7 +119,7 @@ pub(super) fn face_cost(corners: [Point; 3], surface: &impl CuttingSurface) -> f
     1.0 + 0.5 * shape + 0.5 * (1.0 - normal.dot(surface.normal(a)).abs())
 }
 
-/// What an interface is like.
+/// Measures of an interface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InterfaceMeasures {
     /// Number of faces.
@@ -144,8 +144,8 @@ impl InterfaceMeasures {
 /// Counts faces and over-constrained tetrahedra; pinched vertices are counted elsewhere.
 pub(super) fn measure<P: Pages>(
     core: &mut Mesh<P>,
-    labels: &Labels,
-    rim: &CoreBoundary,
+    labels: &SideLabels,
+    core_boundary: &CoreBoundary,
 ) -> InterfaceMeasures {
     let mut measures = InterfaceMeasures::default();
     for t in tet_ids(core) {
@@ -168,7 +168,7 @@ pub(super) fn measure<P: Pages>(
             continue;
         }
         for i in 0..4 {
-            constrained += u32::from(is_constrained(&tet, i, rim));
+            constrained += u32::from(is_constrained(&tet, i, core_boundary));
         }
         measures.over_constrained += u64::from(cut >= 2);
         measures.at_surface += u64::from(cut == 1 && constrained >= 1);
@@ -176,30 +176,27 @@ pub(super) fn measure<P: Pages>(
     measures
 }
 
-/// Whether face `i` is required for ever, not only as a part of the rim.
-pub(super) fn is_constrained(tet: &Tet, i: usize, rim: &CoreBoundary) -> bool {
-    tet.is_required(i) && (tet.neighbor[i].exists() || rim.find(tet.face(i)).is_none())
+/// Returns whether face `i` is required for ever, not only as a part of the core boundary.
+pub(super) fn is_constrained(tet: &Tet, i: usize, core_boundary: &CoreBoundary) -> bool {
+    tet.is_required(i) && (tet.neighbor[i].exists() || core_boundary.find(tet.face(i)).is_none())
 }
 
-/// Layers beyond which nobody counts: two are asked for.
-const LAYERS_MOST: u32 = 3;
+/// Layers counted, at most: two are required.
+const LAYERS_MAX: u32 = 3;
 
 /// The least number of tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone;
-/// [`LAYERS_MOST`] stands for more.
+/// [`LAYERS_MAX`] stands for more.
 ///
-/// The way leads through the core and over its rim into the host. Effects: uses the core's scratch map. Where no interface is, there is no
-/// such number: `None`.
+/// The walk leads through the core and over its boundary into the host. Effects: uses the core's scratch map. `None` if
+/// there is no interface.
 pub(super) fn layers_least<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
-    labels: &Labels,
-    rim: &CoreBoundary,
+    labels: &SideLabels,
+    core_boundary: &CoreBoundary,
     surface: &impl CuttingSurface,
 ) -> Option<u32> {
-    core.clear_scratch();
-    for n in 0..dense(core.tet_ids_end()) {
-        core.set_scratch(n, NONE);
-    }
+    core.reset_scratch(dense(core.tet_ids_end()), NONE);
     let mut layer = Vec::new();
     for t in tet_ids(core) {
         let tet = core.tet(t);
@@ -211,9 +208,9 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
     if layer.is_empty() {
         return None;
     }
-    // Tetrahedra of the host in the layer at hand and the one before: a way never leads farther back.
+    // Tetrahedra of the host in the current layer and the one before: a walk never leads farther back.
     let (mut beyond, mut before) = (BTreeSet::new(), BTreeSet::new());
-    for n in 1..=LAYERS_MOST {
+    for n in 1..=LAYERS_MAX {
         check_cancelled();
         let mut next = Vec::new();
         let mut next_beyond = BTreeSet::new();
@@ -224,7 +221,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
             }
             for (i, across) in tet.neighbor.into_iter().enumerate() {
                 if !across.exists() {
-                    next_beyond.extend(rim.find(tet.face(i)).map(FaceRef::tet));
+                    next_beyond.extend(core_boundary.find(tet.face(i)).map(FaceRef::tet));
                 } else if core.scratch(dense(across.tet())) == NONE {
                     core.set_scratch(dense(across.tet()), n + 1);
                     next.push(across.tet());
@@ -237,7 +234,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
                 return Some(n - 1);
             }
             let onward = tet.neighbor.into_iter().filter(|across| across.exists());
-            // Back into the core the way is shorter.
+            // Back into the core the walk is shorter.
             for across in onward.map(FaceRef::tet) {
                 if !beyond.contains(&across)
                     && !before.contains(&across)
@@ -250,10 +247,10 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
         next_beyond.retain(|t| !beyond.contains(t) && !before.contains(t));
         (before, beyond, layer) = (beyond, next_beyond, next);
     }
-    Some(LAYERS_MOST)
+    Some(LAYERS_MAX)
 }
 
-/// Whether all vertices of `tet` lie in the refined zone at its narrowest.
+/// Returns whether all vertices of `tet` lie in the refined zone at its narrowest.
 fn is_in_zone<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSurface) -> bool {
     tet.vertices().into_iter().all(|v| {
         let (p, h) = mesh.point_and_size(v);
@@ -263,11 +260,11 @@ fn is_in_zone<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSur
 
 /// Tetrahedra with a face on the interface, and how many of them have their circumsphere within the refined zone.
 ///
-/// The zone is taken at its narrowest, with h as it is at the center. That is the whole condition where h is uniform; where it falls
-/// towards the zone's limit, a sphere may count that is not wholly within, and `frozen_hits` is what proves.
+/// The zone is taken at its narrowest, with h as at the center. That is the whole condition if h is uniform. Where h
+/// falls towards the zone's limit, a sphere may count that is not wholly within; `frozen_hits` is the proof.
 pub(super) fn enclosed<P: Pages>(
     core: &mut Mesh<P>,
-    labels: &Labels,
+    labels: &SideLabels,
     surface: &impl CuttingSurface,
     h: &dyn Fn(Point) -> f64,
 ) -> (u64, u64) {

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-/// Bytes free on the disk of `dir`, where the system tells.
+/// Bytes free on the disk of `dir`, if the system reports them.
 #[cfg(unix)]
 pub fn available_bytes(dir: &Path) -> Option<u64> {
     let disk = rustix::fs::statvfs(dir).ok()?;

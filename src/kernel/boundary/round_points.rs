@@ -1,4 +1,4 @@
-//! Vertices that left the surface are exact where doubles had no room; now they move apart until doubles have some.
+//! Moves vertices that left the surface apart, until exact positions can be rounded to doubles.
 //!
 //! ```text
 //!      a'---X---b'        A vertex that replaces X lies in a wedge near X, and the next one, which replaces a neighbor of X,
@@ -8,29 +8,29 @@
 //!          c--            Between facets nearer to each other than the last bits of their corners there is none.
 //! ```
 
-use super::chain::Trouble;
+use super::chain::PatchFailure;
+use super::complex::TetComplex;
 use super::exact::ExactPoint;
 use super::free_vertex::remove_free;
-use super::kernel::{HalfSpace, center, room};
-use super::patch::Patch;
-use super::space::Space;
+use super::inscribed_ball::{HalfSpace, ball_center, clearance};
+use super::patch::RecoveryPatch;
 use super::suppress::half_space;
 use super::walk::ball;
 use tetdb_base::geom::{Dyadic, IdSet, Point};
 use tetdb_base::storage::Pages;
 
-/// Times all vertices are moved: room grows by a factor each time.
+/// Rounds over all vertices: the clearance grows by a factor each time.
 const ROUNDS_MAX: usize = 60;
 
-/// A move that gives less room than this many times the old is not worth it.
+/// Least factor by which a move must raise the clearance.
 const GAIN_MIN: f64 = 1.25;
 
-/// Where the room is narrowest, as a share of what doubles could hold: coordinates keep so many bits below it.
+/// Precision at the narrowest place, as a share of the clearance: coordinates keep so many bits below it.
 const FINE: f64 = 1.0 / 1024.0;
 
-impl<P: Pages> Patch<'_, P> {
+impl<P: Pages> RecoveryPatch<'_, P> {
     /// Takes away or moves the new vertices until all are doubles. They must be off the surface.
-    pub(super) fn settle(&mut self) -> Result<(), Trouble> {
+    pub(super) fn round_to_doubles(&mut self) -> Result<(), PatchFailure> {
         for _ in 0..ROUNDS_MAX {
             let mut exact = false;
             let mut changed = false;
@@ -53,10 +53,10 @@ impl<P: Pages> Patch<'_, P> {
                 break;
             }
         }
-        Err(Trouble::Precision("doubles leave no place beside its neighbors"))
+        Err(PatchFailure::Precision("doubles leave no place beside its neighbors"))
     }
 
-    /// Moves free vertex `v` to the middle of what sees its ball, to a double if one sees it.
+    /// Moves free vertex `v` to the middle of the region that sees its ball, to a double if one sees it.
     fn move_apart(&mut self, v: u32) -> bool {
         let ball = ball(self, v);
         let mut reach = 0.0f64;
@@ -74,15 +74,15 @@ impl<P: Pages> Patch<'_, P> {
         if !was_exact && !neighbors.iter().any(|&u| self.is_exact(u)) {
             return false;
         }
-        let Some(best) = center(&planes, reach) else {
+        let Some(best) = ball_center(&planes, reach) else {
             return false;
         };
         let old = self.placement(v);
-        let (now, then) = (room(&planes, Point::ZERO), room(&planes, best));
+        let (now, then) = (clearance(&planes, Point::ZERO), clearance(&planes, best));
         // As a double, at best in the middle, else on the way there.
         for share in [1.0, 0.5, 0.25, 0.0] {
             let place = self.position(v) + best * share;
-            let gains = was_exact || room(&planes, best * share) > now * GAIN_MIN;
+            let gains = was_exact || clearance(&planes, best * share) > now * GAIN_MIN;
             if gains && self.try_place(v, &ball, (place, None)) {
                 return true;
             }

@@ -1,6 +1,7 @@
-//! Looking ahead: what would come of changes to a mesh, tried on all threads of the run before their turn.
+//! Speculative evaluation: threads evaluate the next operations on a mesh before their turn.
 //!
-//! Each try has a draft of the mesh for itself. What came of it holds as long as nothing changed at the vertices of the tetrahedra that it has read.
+//! Each evaluation has a private draft of the mesh. Its outcome holds as long as nothing changes at the vertices of the
+//! tetrahedra that it has read.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -12,47 +13,47 @@ use super::anatomy::VERTEX_MASK;
 use tetdb_base::storage::{DraftPages, Pages, check_cancelled, kind, parallel};
 
 /// Something to be tried on many items.
-pub trait Trial: Sync {
-    /// What it is tried on.
+pub trait Speculation: Sync {
+    /// An item to evaluate.
     type Item: Sync;
-    /// What one thread uses again and again; must not have a say in what comes of it.
+    /// Scratch of one thread; it must not influence outcomes.
     type Scratch: Send;
-    /// What comes of it.
+    /// Outcome of an evaluation.
     type Outcome: Send;
 
-    /// Tries it on a draft, which may be left changed where that is part of what is found.
+    /// Evaluates an item on a draft, which may stay changed.
     fn attempt<P: Pages>(
         &self,
         scratch: &mut Self::Scratch,
         mesh: &mut Mesh<P>,
         item: &Self::Item,
-    ) -> Option<(Self::Outcome, Draft)>;
+    ) -> Option<(Self::Outcome, DraftState)>;
 }
 
-/// What is left of a draft.
+/// State of the draft after an evaluation.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Draft {
-    /// It is to be as the mesh: else what was found does not count.
+pub enum DraftState {
+    /// The draft must equal the mesh; else the outcome does not count.
     Unchanged,
     /// It may be anything.
     Used,
 }
 
-/// What was found, and what it rests on.
-pub struct Foreseen<F> {
-    /// What came of it.
+/// An outcome, and the vertices it depends on.
+pub struct Evaluated<F> {
+    /// The outcome.
     pub found: F,
     /// Vertices of all tetrahedra read, in ascending order. Where nothing has changed at them, the same comes of it still.
     pub vertices: Vec<u32>,
 }
 
 /// Tries all items, each on the mesh as it is, which stays so: one thread for each scratch. In the order of the items; nothing where not all of the mesh is in memory.
-pub fn look_ahead<P: Pages, T: Trial>(
+pub fn evaluate_speculatively<P: Pages, T: Speculation>(
     mesh: &mut Mesh<P>,
     items: &[T::Item],
     scratch: &mut [T::Scratch],
     trial: &T,
-) -> Vec<Option<Foreseen<T::Outcome>>> {
+) -> Vec<Option<Evaluated<T::Outcome>>> {
     let mut all = Vec::new();
     all.resize_with(items.len(), || None);
     let Some(shared) = mesh.shared() else {
@@ -74,11 +75,11 @@ pub fn look_ahead<P: Pages, T: Trial>(
             let Some((found, left)) = trial.attempt(scratch, &mut draft, item) else {
                 continue;
             };
-            // What took a number and gave it back has changed which one is next.
+            // Taking a number and giving it back may change which number is next.
             let is_unchanged = || draft.state == state && draft.pages.is_unchanged();
-            if left == Draft::Used || is_unchanged() {
+            if left == DraftState::Used || is_unchanged() {
                 let vertices = vertices_met(&draft.pages);
-                done.push((at, Foreseen { found, vertices }));
+                done.push((at, Evaluated { found, vertices }));
             }
         }
     };
@@ -92,7 +93,7 @@ pub fn look_ahead<P: Pages, T: Trial>(
 fn vertices_met(pages: &DraftPages) -> Vec<u32> {
     let (mut base, mut vertices) = (pages.base(), Vec::new());
     let end = base.n_pages::<{ kind::TETS }>() << SLOT_BITS;
-    // What lies beyond was made in the draft.
+    // Tetrahedra beyond were added in the draft.
     for &t in pages.tets_met().iter().filter(|&&t| t < end) {
         let slot = base.read::<{ kind::TETS }>(t);
         vertices.extend(slot[..4].iter().map(|node| node.to_native() & VERTEX_MASK));

@@ -1,42 +1,42 @@
-//! A child on its way: its vertices and tetrahedra get their numbers, then they are written.
+//! Builds a child: numbers its vertices and tetrahedra, then writes them.
 
-use super::core::{SHARED, copy_attribute, fate, is_held, tet_ids};
+use super::core::{SHARED, copy_attribute, is_held, placement, tet_ids};
 use super::interface_faces::for_each_interface_face;
-use super::opened::Opened;
+use super::open_cut::OpenCut;
 use super::surface::CuttingSurface;
 use crate::mesh::anatomy::{FROZEN, REQUIRED};
-use crate::mesh::{FaceRef, InterfaceFace, Mesh, Workspace, dense, sparse};
+use crate::mesh::{FaceRef, Mesh, MeshInterfaceFace, Workspace, dense, sparse};
 use tetdb_base::geom::HilbertFrame;
 use tetdb_base::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
 use tetdb_schema::page::NONE;
 
-/// A child on its way.
-pub(super) struct Split<'a, P: Pages, Q: Pages, R: Pages> {
+/// A child under construction.
+pub(super) struct ChildBuilder<'a, P: Pages, Q: Pages, R: Pages> {
     pub host: &'a mut Mesh<P>,
     pub core: &'a mut Mesh<Q>,
     pub child: &'a mut Mesh<R>,
-    pub opened: &'a Opened,
+    pub open_cut: &'a OpenCut,
     pub high: bool,
-    /// Where the map of tetrahedra begins in each scratch map, behind that of vertices.
+    /// Begin of the map of tetrahedra in each scratch map, after that of vertices.
     pub host_base: u32,
     pub core_base: u32,
     /// Tetrahedra out of the core with a required face whose vertices may all be in it.
-    pub at_core: Vec<u32>,
+    pub tets_at_core: Vec<u32>,
 }
 
-impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
+impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
     /// Bits of the fate of a tetrahedron that goes to this child.
-    fn fate(&self) -> u32 {
-        if self.high { fate::HIGH } else { 0 }
+    fn side_bits(&self) -> u32 {
+        if self.high { placement::HIGH } else { 0 }
     }
 
-    /// Whether a vertex of the host that the core does not have is on this side.
-    pub fn is_beside(&mut self, v: u32) -> bool {
+    /// Returns whether a vertex of the host that the core does not have is on this side.
+    pub fn is_on_side(&mut self, v: u32) -> bool {
         let p = self.host.point(v);
-        (self.opened.zone.surface.distance(p) >= 0.0) == self.high
+        (self.open_cut.zone.surface.distance(p) >= 0.0) == self.high
     }
 
-    /// Adds all vertices of the child's tetrahedra; both scratch maps tell their numbers.
+    /// Adds all vertices of the child's tetrahedra. Afterwards both scratch maps have their numbers.
     pub fn add_vertices(
         &mut self,
         order: &HilbertFrame,
@@ -57,35 +57,35 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
                 continue;
             }
             if met & SHARED == 0 {
-                if self.is_beside(v) {
+                if self.is_on_side(v) {
                     let key = order.index(self.host.point(v));
-                    let met = OF_HOST | met;
-                    let source = OF_HOST | v;
+                    let met = IN_HOST | met;
+                    let source = IN_HOST | v;
                     sorter.push(ChildVertex { key, met, source })?;
                 }
                 continue;
             }
-            // Vertices of the rim have in the core no tag of their own.
+            // Vertices of the core boundary have in the core no tag of their own.
             let (copy, met) = (met & !SHARED, self.core.scratch(dense(met & !SHARED)));
             if met != NONE && is_held(self.core, copy) {
                 let key = order.index(self.host.point(v));
-                let source = OF_HOST | v;
+                let source = IN_HOST | v;
                 sorter.push(ChildVertex { key, met, source })?;
             }
         }
         for vertex in sorter.finish()? {
             let source = vertex?.source;
-            if source & OF_HOST == 0 {
+            if source & IN_HOST == 0 {
                 self.add_core_vertex(source);
                 continue;
             }
-            let v = source & !OF_HOST;
+            let v = source & !IN_HOST;
             let number = self.add_host_vertex(v);
-            let known = self.host.scratch(dense(v));
-            if known & SHARED == 0 {
+            let word = self.host.scratch(dense(v));
+            if word & SHARED == 0 {
                 self.host.set_scratch(dense(v), number);
             } else {
-                self.core.set_scratch(dense(known & !SHARED), number);
+                self.core.set_scratch(dense(word & !SHARED), number);
             }
         }
         Ok(())
@@ -93,14 +93,11 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
 
     /// Numbers the core's vertices as they are met in tetrahedra of this side; in its scratch map others have [`NONE`].
     fn meet_core_vertices(&mut self) {
-        self.core.clear_scratch();
-        for n in 0..self.core_base {
-            self.core.set_scratch(n, NONE);
-        }
+        self.core.reset_scratch(self.core_base, NONE);
         let mut met = 0;
         for t in tet_ids(self.core) {
             let tet = self.core.tet(t);
-            let ours = tet.is_live() && self.opened.labels.is_high(t) == self.high;
+            let ours = tet.is_live() && self.open_cut.labels.is_high(t) == self.high;
             self.core.set_scratch(self.core_base + dense(t), if ours { 0 } else { NONE });
             if !ours {
                 continue;
@@ -133,11 +130,11 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
     /// The child's number of a vertex of one of the host's tetrahedra of this side.
     #[inline]
     fn host_vertex(&mut self, v: u32) -> u32 {
-        let known = self.host.scratch(dense(v));
-        if known & SHARED == 0 {
-            return known;
+        let word = self.host.scratch(dense(v));
+        if word & SHARED == 0 {
+            return word;
         }
-        let copy = known & !SHARED;
+        let copy = word & !SHARED;
         let number = self.core.scratch(dense(copy));
         if number != NONE {
             return number;
@@ -149,19 +146,17 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         number
     }
 
-    /// Whether the host's tetrahedron at position `n` goes to this child; then the number in the scratch map.
+    /// Returns whether the host's tetrahedron at position `n` goes to this child; then the number in the scratch map.
     #[inline]
-    fn of_host(&mut self, n: u32) -> Option<u32> {
+    fn child_tet_of_host(&mut self, n: u32) -> Option<u32> {
         let word = self.host.scratch(self.host_base + n);
-        (word & fate::BITS == self.fate()).then_some(word & !fate::BITS)
+        (word & placement::BITS == self.side_bits()).then_some(word & !placement::BITS)
     }
 
     /// Puts into the scratch maps the child's number of each of its tetrahedra.
     pub fn number_tets(&mut self) {
-        let fate = self.fate();
-        for n in 0..dense(self.child.vertex_ids_end()) {
-            self.child.set_scratch(n, 0);
-        }
+        let side = self.side_bits();
+        self.child.reset_scratch(dense(self.child.vertex_ids_end()), 0);
         // First the smallest number of a vertex, which is counted in the child's scratch map.
         for t in tet_ids(self.core) {
             let place = self.core_base + dense(t);
@@ -177,7 +172,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             if n & 1023 == 0 {
                 check_cancelled();
             }
-            if self.of_host(n).is_some() {
+            if self.child_tet_of_host(n).is_some() {
                 let [a, b, c, d] = self.host.tet(sparse(n)).vertices();
                 let numbers = [
                     self.host_vertex(a),
@@ -186,7 +181,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
                     self.host_vertex(d),
                 ];
                 let least = least(numbers);
-                self.host.set_scratch(self.host_base + n, fate | least);
+                self.host.set_scratch(self.host_base + n, side | least);
                 self.count(least);
             }
         }
@@ -201,14 +196,14 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             let place = self.core_base + dense(t);
             let least = self.core.scratch(place);
             if least != NONE {
-                let number = self.next_of(least);
+                let number = self.next_number_at(least);
                 self.core.set_scratch(place, number);
             }
         }
         for n in 0..dense(self.host.tet_ids_end()) {
-            if let Some(least) = self.of_host(n) {
-                let number = self.next_of(least);
-                self.host.set_scratch(self.host_base + n, fate | number);
+            if let Some(least) = self.child_tet_of_host(n) {
+                let number = self.next_number_at(least);
+                self.host.set_scratch(self.host_base + n, side | number);
             }
         }
         self.child.clear_scratch();
@@ -224,7 +219,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
 
     /// The next number of a tetrahedron with that first vertex.
     #[inline]
-    fn next_of(&mut self, first: u32) -> u32 {
+    fn next_number_at(&mut self, first: u32) -> u32 {
         let n = self.child.scratch(dense(first));
         self.child.set_scratch(dense(first), n + 1);
         sparse(n)
@@ -235,7 +230,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             if n & 1023 == 0 {
                 check_cancelled();
             }
-            let Some(number) = self.of_host(n) else {
+            let Some(number) = self.child_tet_of_host(n) else {
                 continue;
             };
             let tet = self.host.tet(sparse(n));
@@ -247,14 +242,14 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
                 copy.node[i] = self.host_vertex(tet.vertex(i)) | tet.node[i] & REQUIRED;
                 let across = tet.neighbor[i];
                 if across.exists() {
-                    // Those across the rim are linked from the core.
-                    let other = self.of_host(dense(across.tet()));
+                    // Those across the core boundary are linked from the core.
+                    let other = self.child_tet_of_host(dense(across.tet()));
                     copy.neighbor[i] =
                         other.map_or(FaceRef::NONE, |t| FaceRef::new(t, across.face()));
                 }
             }
             if required != 0 && shared > 2 {
-                self.at_core.push(number);
+                self.tets_at_core.push(number);
             }
             let (region, flags) = self.host.tet_attribute(sparse(n));
             self.child.place_tet(number, copy);
@@ -283,10 +278,11 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
                     } else {
                         copy.neighbor[i] = FaceRef::new(other, across.face());
                     }
-                } else if let Some(beyond) = self.opened.rim.find(tet.face(i)) {
+                } else if let Some(beyond) = self.open_cut.core_boundary.find(tet.face(i)) {
                     let there = self.host.tet(beyond.tet());
-                    let other = self.of_host(dense(beyond.tet()));
-                    let other = other.expect("the rim is not free: both sides of it go together");
+                    let other = self.child_tet_of_host(dense(beyond.tet()));
+                    let other =
+                        other.expect("the core boundary is not free: both sides of it go together");
                     let other = FaceRef::new(other, beyond.face());
                     copy.neighbor[i] = other;
                     self.child.set_neighbor(other, here);
@@ -302,14 +298,19 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
     }
 
     pub fn new_interface(&mut self) {
-        let (child, high, cut) = (&mut *self.child, self.high, self.opened.zone.cut);
+        let (child, high, cut) = (&mut *self.child, self.high, self.open_cut.zone.cut);
         let mut index = 0;
-        for_each_interface_face(self.core, &self.opened.labels, |core, tet, i| {
+        for_each_interface_face(self.core, &self.open_cut.labels, |core, tet, i| {
             let mut vertices = tet.face(i).map(|v| core.scratch(dense(v)));
             if high {
                 vertices.swap(1, 2);
             }
-            child.add_interface_face(InterfaceFace { vertices, cut, index, side: u32::from(high) });
+            child.add_interface_face(MeshInterfaceFace {
+                vertices,
+                cut,
+                index,
+                side: u32::from(high),
+            });
             index += 1;
         });
     }
@@ -320,15 +321,16 @@ sort_record! {
     struct ChildVertex {
         /// Its place along the curve.
         key: u64,
-        /// When it was met; [`OF_HOST`] when in the host alone.
+        /// Order of the first visit, with [`IN_HOST`] for a vertex in the host alone.
         met: u32,
-        /// Where it comes from: its id, [`OF_HOST`] when that is one of the host.
+        /// Id of the source, with [`IN_HOST`] for one of the host.
         source: u32,
     }
 }
 
-/// Of a vertex met in the host alone: after those of the core. Of a source: in the host.
-const OF_HOST: u32 = 1 << 31;
+/// Bit of `met` for a vertex met in the host alone: such vertices come after those of the core. Bit of `source` for an
+/// id of the host.
+const IN_HOST: u32 = 1 << 31;
 
 #[inline]
 fn least([a, b, c, d]: [u32; 4]) -> u32 {

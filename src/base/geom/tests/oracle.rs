@@ -1,4 +1,4 @@
-//! Numbers `m · 2^e` without rounding: the slow truth that signs are tested against.
+//! Exact numbers `m · 2^e`: a slow reference for the signs.
 //!
 //! On a library's whole numbers, so that it shares nothing with the exact numbers of recovery, which it tests.
 
@@ -108,9 +108,9 @@ pub fn insphere_truth([a, b, c, d, e]: &[Exact; 5]) -> Ordering {
 }
 
 /// Seeded, uniform in [-0.5, 0.5).
-pub struct Numbers(pub u64);
+pub struct RandomNumbers(pub u64);
 
-impl Numbers {
+impl RandomNumbers {
     pub fn next(&mut self) -> f64 {
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -122,7 +122,7 @@ impl Numbers {
     }
 }
 
-/// How many cases a test tries.
+/// Number of cases in a test.
 pub fn cases() -> usize {
     let asked = std::env::var("TETDB_CASES").ok();
     asked.and_then(|n| n.parse().ok()).unwrap_or(100_000)

@@ -1,31 +1,31 @@
-//! How an edge or a point of a wire touches triangles and other edges, by exact signs.
+//! Contacts of embedded edges and points with triangles and other edges, by exact signs.
 
 use super::contact::{Contact, ContactKind, Projection, edge_meets, segment_in_plane, side};
 use crate::geom::{Point, orient};
 
 /// An edge with the numbers of its vertices; equal numbers mean equal points and the reverse.
 #[derive(Clone, Copy)]
-pub(super) struct Edge {
+pub(super) struct EmbeddedEdge {
     pub ids: [u32; 2],
     pub ends: [Point; 2],
 }
 
-/// What an edge is to a triangle.
+/// Relation of an edge to a triangle.
 pub(super) enum EdgeAtTriangle {
-    /// They share a vertex at most.
+    /// They share at most a vertex.
     Apart,
-    /// It is one of the triangle's own.
-    Own,
-    /// They touch where they should not.
+    /// The edge is a side of the triangle.
+    Side,
+    /// They have a forbidden contact.
     Touching(Contact),
 }
 
-/// Whether `t` has an area, without which the signs below mean nothing.
+/// Returns whether `t` has an area, without which the signs below mean nothing.
 pub(super) fn has_area(t: &[Point; 3]) -> bool {
-    Projection::of(t).turn(t[0], t[1], t[2]) != 0
+    Projection::new(t).turn(t[0], t[1], t[2]) != 0
 }
 
-impl Edge {
+impl EmbeddedEdge {
     /// The vertex shared with another set of vertices, as places in both, when there is one alone.
     fn shared(&self, others: &[u32]) -> Vec<(usize, usize)> {
         let places = self.ids.iter().enumerate();
@@ -33,7 +33,7 @@ impl Edge {
         places.filter_map(place).collect()
     }
 
-    /// What it is to triangle `t`, which has an area.
+    /// Relation of the edge to triangle `t`, which must have an area.
     pub fn at_triangle(&self, t: [Point; 3], t_ids: [u32; 3]) -> EdgeAtTriangle {
         let [a, b] = self.ends;
         let touch = match self.shared(&t_ids).as_slice() {
@@ -42,12 +42,12 @@ impl Edge {
                 [at_a, at_b] => edge_meets(a, b, at_a, at_b, &t),
             },
             &[(i, k)] => leaves_into(self.ends[1 - i], [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]),
-            _ => return EdgeAtTriangle::Own,
+            _ => return EdgeAtTriangle::Side,
         };
         touch.map_or(EdgeAtTriangle::Apart, EdgeAtTriangle::Touching)
     }
 
-    /// Where it touches another edge elsewhere than in a vertex of both. Edges of the same vertices give none.
+    /// A contact with another edge outside a common vertex. Edges of the same vertices give none.
     pub fn at_edge(&self, other: &Self) -> Option<Contact> {
         let ([a, b], [c, d]) = (self.ends, other.ends);
         let found = |kind, at| Some(Contact { kind, at });
@@ -75,7 +75,7 @@ impl Edge {
             let at = [c, d].into_iter().find(|&x| is_on(x));
             return at.or(covered.then_some(a)).and_then(|at| found(ContactKind::EdgeOnEdge, at));
         };
-        let plane = Projection::of(&[a, b, third]);
+        let plane = Projection::new(&[a, b, third]);
         let [of_c, of_d] = [c, d].map(|x| plane.turn(a, b, x));
         let [of_a, of_b] = [a, b].map(|x| plane.turn(c, d, x));
         if of_c * of_d > 0 || of_a * of_b > 0 {
@@ -89,12 +89,12 @@ impl Edge {
     }
 }
 
-/// Whether the edge from the first corner of `t` to `x` lies in the plane of `t` and goes into it, or along its side.
+/// Returns whether the edge from the first corner of `t` to `x` lies in the plane of `t` and goes into it, or along its side.
 fn leaves_into(x: Point, t: [Point; 3]) -> Option<Contact> {
     if side(&t, x) != 0 {
         return None;
     }
-    let plane = Projection::of(&t);
+    let plane = Projection::new(&t);
     let hand = plane.turn(t[0], t[1], t[2]);
     let turns = [plane.turn(t[0], t[1], x), plane.turn(t[0], x, t[2])].map(|turn| hand * turn);
     let kind = match turns.contains(&0) {
@@ -105,7 +105,7 @@ fn leaves_into(x: Point, t: [Point; 3]) -> Option<Contact> {
     turns.iter().all(|&turn| turn >= 0).then_some(Contact { kind, at })
 }
 
-/// How `p`, which is no corner of `t`, lies on `t`.
+/// The contact of `p`, which is no corner of `t`, with `t`.
 pub(super) fn point_at_triangle(p: Point, t: &[Point; 3]) -> Option<Contact> {
     match side(t, p) {
         0 => segment_in_plane(p, p, t),
@@ -113,7 +113,7 @@ pub(super) fn point_at_triangle(p: Point, t: &[Point; 3]) -> Option<Contact> {
     }
 }
 
-/// Whether `p`, which is no end of it, lies on an edge.
+/// Returns whether `p`, which is no end of it, lies on an edge.
 pub(super) fn is_on_edge(p: Point, [a, b]: [Point; 2]) -> bool {
     a.min(b).cmple(p).all() && p.cmple(a.max(b)).all() && !has_area(&[a, b, p])
 }
@@ -137,7 +137,7 @@ mod tests {
         [0, 1, 2].map(|i| a[i] - b[i])
     }
 
-    /// Whether two closed edges between whole points share a point, by solving for it.
+    /// Returns whether two closed edges between whole points share a point, by solving for it.
     fn share_a_point([p, a]: [Whole; 2], [q, b]: [Whole; 2]) -> bool {
         let (u, v, w) = (less(a, p), less(b, q), less(q, p));
         let n = cross(u, v);
@@ -161,8 +161,10 @@ mod tests {
             let id = |i: usize| {
                 p.iter().position(|q| *q == p[i]).map(|at| at as u32).unwrap_or_default()
             };
-            let edge =
-                |i: usize, j: usize| Edge { ids: [id(i), id(j)], ends: [point(p[i]), point(p[j])] };
+            let edge = |i: usize, j: usize| EmbeddedEdge {
+                ids: [id(i), id(j)],
+                ends: [point(p[i]), point(p[j])],
+            };
             if p[0] == p[1] || p[2] == p[3] {
                 continue;
             }
@@ -198,7 +200,7 @@ mod tests {
         assert!(point_at_triangle(Point::new(1.0, 1.0, 1.000_000_1), &t).is_none());
         assert!(is_on_edge(Point::new(2.0, 0.0, 1.0), [t[0], t[1]]));
         assert!(!is_on_edge(Point::new(6.0, 0.0, 3.0), [t[0], t[1]]));
-        let edge = |a, b| Edge { ids: [0, 9], ends: [a, b] };
+        let edge = |a, b| EmbeddedEdge { ids: [0, 9], ends: [a, b] };
         let own = [0, 1, 2];
         let kind = |b: Point| match edge(t[0], b).at_triangle(t, own) {
             EdgeAtTriangle::Touching(c) => Some(c.kind),

@@ -1,39 +1,39 @@
-//! Missing facets that lie in one plane and meet in missing segments: recovered as one, their own segments afterwards.
+//! Missing facets in one plane that meet in missing segments: recovered as one part, their own segments afterwards.
 //!
-//! What pierces a flat part of the surface pierces it once, however many narrow facets it is made of: so points are put
-//! where edges pierce the part, not where its segments cross faces, and its segments are reached by turning edges.
+//! An edge pierces a flat part of the surface once, even if the part has many narrow facets. So points are put where
+//! edges pierce the part, not where its segments cross faces. Its segments are recovered by turning edges.
 
 use std::collections::BTreeMap;
 
-use super::space::Space;
+use super::complex::TetComplex;
 use super::walk::find_edge;
 
-/// Facets in one plane, each beside the next.
+/// Facets in one plane that share missing segments.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FlatPart {
     /// All turn the same way.
     pub facets: Vec<[u32; 3]>,
     /// Sides of facets where the part ends, in their direction.
-    pub rim: Vec<(u32, u32)>,
+    pub outline: Vec<(u32, u32)>,
     /// Missing segments between two of the facets.
     pub inner: Vec<(u32, u32)>,
 }
 
 impl FlatPart {
     fn one(f: [u32; 3]) -> Self {
-        Self { facets: vec![f], rim: sides(f).to_vec(), inner: Vec::new() }
+        Self { facets: vec![f], outline: sides(f).to_vec(), inner: Vec::new() }
     }
 
-    /// Whether `v` is a corner of one of its facets.
-    pub(super) fn has(&self, v: u32) -> bool {
+    /// Returns whether `v` is a corner of one of its facets.
+    pub fn has(&self, v: u32) -> bool {
         self.facets.iter().any(|f| f.contains(&v))
     }
 
-    /// The same part, each vertex by another name.
-    pub(super) fn renamed(&self, mut name: impl FnMut(u32) -> u32) -> Self {
+    /// The same part with renamed vertices.
+    pub fn renamed(&self, mut name: impl FnMut(u32) -> u32) -> Self {
         let facets = self.facets.iter().map(|f| f.map(&mut name)).collect();
         let mut pairs = |all: &[(u32, u32)]| all.iter().map(|&(a, b)| (name(a), name(b))).collect();
-        Self { facets, rim: pairs(&self.rim), inner: pairs(&self.inner) }
+        Self { facets, outline: pairs(&self.outline), inner: pairs(&self.inner) }
     }
 }
 
@@ -48,14 +48,14 @@ pub(super) fn single_parts(facets: &[[u32; 3]]) -> Vec<FlatPart> {
 }
 
 /// The flat parts of `facets`, which are all there are at their missing segments, in the order of their first facets.
-pub(super) fn flat_parts<S: Space>(s: &mut S, facets: &[[u32; 3]]) -> Vec<FlatPart> {
+pub(super) fn flat_parts<S: TetComplex>(s: &mut S, facets: &[[u32; 3]]) -> Vec<FlatPart> {
     let mut at: BTreeMap<(u32, u32), Vec<usize>> = BTreeMap::new();
     for (i, &f) in facets.iter().enumerate() {
         for (a, b) in sides(f) {
             at.entry((a.min(b), a.max(b))).or_default().push(i);
         }
     }
-    // Two facets in one plane share the segment, nobody else has it, and it is missing.
+    // Two facets in one plane share the segment, no other facet has it, and it is missing.
     let opposite = |i: usize, (a, b): (u32, u32)| facets[i].into_iter().find(|&v| v != a && v != b);
     at.retain(|&(a, b), owners| {
         let &[i, j] = owners.as_slice() else {
@@ -79,7 +79,7 @@ pub(super) fn flat_parts<S: Space>(s: &mut S, facets: &[[u32; 3]]) -> Vec<FlatPa
             part.facets.push(f);
             for (a, b) in sides(f) {
                 let Some(owners) = at.get(&(a.min(b), a.max(b))) else {
-                    part.rim.push((a, b));
+                    part.outline.push((a, b));
                     continue;
                 };
                 let j = if owners[0] == i { owners[1] } else { owners[0] };

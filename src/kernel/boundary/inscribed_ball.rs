@@ -1,7 +1,7 @@
-//! The center of the largest ball inside half-spaces: where a vertex sees everything best.
+//! The center of the largest ball inside half-spaces: the place of a vertex with the largest clearance.
 //!
 //! Source: R. Seidel, "Small-dimensional linear programming and convex hulls made easy" (1991), on four unknowns: the
-//! center and the radius. Doubles are enough: the answer is a proposal that exact signs accept or refuse.
+//! center and the radius. Doubles suffice: the result is a proposal that exact signs accept or reject.
 
 use tetdb_base::geom::Point;
 
@@ -13,7 +13,7 @@ pub(super) struct HalfSpace {
 }
 
 /// The center of the largest ball inside all half-spaces and the cube of half side `reach` around the origin.
-pub(super) fn center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
+pub(super) fn ball_center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
     let mut rows: Vec<Row> = half_spaces
         .iter()
         .filter(|h| h.normal.is_finite() && h.offset.is_finite())
@@ -34,13 +34,13 @@ pub(super) fn center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
     Some(Point::new(x[0], x[1], x[2]) * reach)
 }
 
-/// How far `at` is inside all half-spaces; negative outside.
-pub(super) fn room(half_spaces: &[HalfSpace], at: Point) -> f64 {
+/// Distance of `at` from the nearest plane; negative outside.
+pub(super) fn clearance(half_spaces: &[HalfSpace], at: Point) -> f64 {
     let rooms = half_spaces.iter().map(|h| h.offset - h.normal.dot(at));
     rooms.fold(f64::INFINITY, f64::min)
 }
 
-/// Factors of the unknowns, their bound behind them; what follows is not looked at.
+/// Factors of the unknowns, followed by their bound; the rest is unused.
 type Row = [f64; 5];
 
 /// Maximizes `goal · x` under `row · x <= bound` and `-1 <= x <= 1`. Of the answer as many numbers count as `goal` has; `deeper` is space for
@@ -115,13 +115,13 @@ mod tests {
     #[test]
     fn the_center_of_a_corner_is_as_far_as_the_cube_allows() {
         let walls = [Point::X, Point::Y, Point::Z].map(|n| HalfSpace { normal: -n, offset: 0.0 });
-        let p = center(&walls, 2.0).expect("a corner has room");
+        let p = ball_center(&walls, 2.0).expect("a corner has room");
         assert!(p.min_element() > 0.5, "{p}");
         let slab = [
             HalfSpace { normal: Point::X, offset: 1e-6 },
             HalfSpace { normal: -Point::X, offset: 0.0 },
         ];
-        let p = center(&slab, 1.0).expect("a slab has room");
+        let p = ball_center(&slab, 1.0).expect("a slab has room");
         assert!((p.x - 5e-7).abs() < 1e-12, "{p}");
     }
 }

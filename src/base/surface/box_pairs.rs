@@ -1,4 +1,4 @@
-//! Which pairs of triangles are near enough to look at.
+//! Pairs of triangles whose boxes share a point.
 
 use rayon::prelude::*;
 
@@ -19,15 +19,15 @@ pub(super) const FOUND_MAX: u64 = 1_000_000;
 /// A tree over the triangles that `keep` accepts.
 pub(super) fn tree_of(
     surface: &Surface,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
     keep: impl Fn(u32) -> bool + Sync,
 ) -> BoxTree {
     let box_of = |t: u32| Aabb::around(surface.corners(t));
-    BoxTree::new(&surface.bounds(), surface.n_triangles() as u32, room, keep, box_of)
+    BoxTree::new(&surface.bounds(), surface.n_triangles() as u32, scratch, keep, box_of)
 }
 
 impl BoxTree {
-    /// Calls `test` on each pair of triangles whose boxes share a point and collects what it returns.
+    /// Calls `test` on each pair of triangles whose boxes share a point and collects its results.
     ///
     /// At most `listed_max` results are kept, of all that are counted; which ones does not depend on
     /// the number of threads. The search ends after a round with more than a million in all.
@@ -67,8 +67,8 @@ impl BoxTree {
             let before = n_found;
             for (block, n) in found {
                 n_found += n;
-                let room = listed_max - listed.len();
-                listed.extend(block.into_iter().take(room));
+                let scratch = listed_max - listed.len();
+                listed.extend(block.into_iter().take(scratch));
             }
             if n_found > FOUND_MAX {
                 break;

@@ -1,6 +1,6 @@
-//! Load and section along an axis, and what a plane across it promises.
+//! Load and section along an axis, and their values for a plane across it.
 
-use super::load::{SizeAt, tally};
+use super::load::{SizeFn, tally};
 use super::surface::Plane;
 use crate::mesh::Mesh;
 use tetdb_base::geom::Point;
@@ -9,7 +9,7 @@ use tetdb_base::storage::Pages;
 /// Bins of a histogram along an axis.
 const BINS: usize = 4096;
 
-/// A chosen plane, and what it promises.
+/// A chosen plane, with its predicted load and area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChosenPlane {
     /// The cutting plane.
@@ -21,7 +21,7 @@ pub struct ChosenPlane {
 }
 
 /// Ends of no position.
-const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+const NO_POSITION: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 #[inline]
 fn with([low, high]: [f64; 2], s: f64) -> [f64; 2] {
@@ -29,7 +29,7 @@ fn with([low, high]: [f64; 2], s: f64) -> [f64; 2] {
 }
 
 /// Load and section along one axis, by bins between the ends of the mesh.
-pub(super) struct Spread {
+pub(super) struct LoadProfile {
     axis: Point,
     low: f64,
     width: f64,
@@ -38,22 +38,22 @@ pub(super) struct Spread {
     section: Vec<f64>,
 }
 
-/// A [`Spread`] in the making: load and section of each bin less those of the bin before, so that a body changes four entries however
+/// A [`LoadProfile`] in the making: load and section of each bin less those of the bin before, so that a body changes four entries however
 /// many bins it covers.
-pub(super) struct Ramps {
+pub(super) struct ProfileBuilder {
     axis: Point,
     low: f64,
     width: f64,
     steps: Vec<[f64; 2]>,
 }
 
-impl Ramps {
-    pub(super) fn new(axis: Point, [low, high]: [f64; 2]) -> Self {
+impl ProfileBuilder {
+    pub fn new(axis: Point, [low, high]: [f64; 2]) -> Self {
         Self { axis, low, width: (high - low) / BINS as f64, steps: vec![[0.0; 2]; BINS + 2] }
     }
 
     /// Spreads a body evenly over the bins between its ends.
-    pub(super) fn add(&mut self, low: f64, high: f64, load: f64, section: f64) {
+    pub fn add(&mut self, low: f64, high: f64, load: f64, section: f64) {
         let low = ((low - self.low) / self.width).max(0.0);
         let high = ((high - self.low) / self.width).min(BINS as f64);
         let first = (low as usize).min(BINS - 1);
@@ -75,13 +75,13 @@ impl Ramps {
         step(last + 1, -rate * tail);
     }
 
-    pub(super) fn add_all(&mut self, other: &Self) {
+    pub fn add_all(&mut self, other: &Self) {
         for (step, more) in self.steps.iter_mut().zip(&other.steps) {
             *step = [step[0] + more[0], step[1] + more[1]];
         }
     }
 
-    pub(super) fn sum_up(self) -> Spread {
+    pub fn sum_up(self) -> LoadProfile {
         let (mut load, mut section) = (Vec::with_capacity(BINS), Vec::with_capacity(BINS));
         let mut sum = [0.0; 2];
         for step in &self.steps[..BINS] {
@@ -90,34 +90,34 @@ impl Ramps {
             load.push(f64::max(sum[0], 0.0));
             section.push(f64::max(sum[1], 0.0));
         }
-        Spread { axis: self.axis, low: self.low, width: self.width, load, section }
+        LoadProfile { axis: self.axis, low: self.low, width: self.width, load, section }
     }
 }
 
-impl Spread {
-    pub(super) fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt, axis: Point) -> Self {
-        let mut of_all = NOTHING;
+impl LoadProfile {
+    pub fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn, axis: Point) -> Self {
+        let mut all_ends = NO_POSITION;
         for v in mesh.vertex_ids() {
-            of_all = with(of_all, axis.dot(mesh.point(v)));
+            all_ends = with(all_ends, axis.dot(mesh.point(v)));
         }
-        let (spread, of_tets) = Self::gather_between(mesh, h, axis, of_all);
-        if of_tets == of_all {
+        let (spread, tet_ends) = Self::gather_between(mesh, h, axis, all_ends);
+        if tet_ends == all_ends {
             return spread;
         }
-        Self::gather_between(mesh, h, axis, of_tets).0
+        Self::gather_between(mesh, h, axis, tet_ends).0
     }
 
     /// Gathers between the ends, which should be those of the corners of all tetrahedra; returns these too.
     fn gather_between<P: Pages>(
         mesh: &mut Mesh<P>,
-        h: &SizeAt,
+        h: &SizeFn,
         axis: Point,
         ends: [f64; 2],
     ) -> (Self, [f64; 2]) {
-        let mut seen = NOTHING;
-        let empty = || Ramps::new(axis, ends);
-        let see = &mut |p| seen = with(seen, axis.dot(p));
-        let [mut ramps, others @ ..] = tally(mesh, h, empty, see, |ramps, piece| {
+        let mut bounds_of_tets = NO_POSITION;
+        let empty = || ProfileBuilder::new(axis, ends);
+        let visit_corner = &mut |p| bounds_of_tets = with(bounds_of_tets, axis.dot(p));
+        let [mut ramps, others @ ..] = tally(mesh, h, empty, visit_corner, |ramps, piece| {
             let [a, b, c, d] = piece.points;
             let at = [axis.dot(a), axis.dot(b), axis.dot(c), axis.dot(d)];
             let low = at[0].min(at[1]).min(at[2].min(at[3]));
@@ -125,11 +125,11 @@ impl Spread {
             ramps.add(low, high, piece.load, piece.load * piece.h);
         });
         others.iter().for_each(|other| ramps.add_all(other));
-        (ramps.sum_up(), seen)
+        (ramps.sum_up(), bounds_of_tets)
     }
 
     /// Position below which the share `low` of the load lies.
-    pub(super) fn quantile(&self, low: f64) -> f64 {
+    pub fn quantile(&self, low: f64) -> f64 {
         let wanted = low * self.load.iter().sum::<f64>();
         let mut sum = 0.0;
         for (bin, &load) in self.load.iter().enumerate() {
@@ -142,8 +142,8 @@ impl Spread {
         self.low + BINS as f64 * self.width
     }
 
-    /// The plane at `offset`, and what it promises.
-    pub(super) fn at(&self, offset: f64) -> ChosenPlane {
+    /// The plane at `offset`, with its predicted load and area.
+    pub fn at(&self, offset: f64) -> ChosenPlane {
         let place = ((offset - self.low) / self.width).clamp(0.0, BINS as f64 - 1.0);
         let bin = place as usize;
         let below: f64 =
@@ -172,8 +172,8 @@ mod tests {
             (6.5, 9.0, 5.0),
             (0.0, BINS as f64 - 1.0, 4095.0),
         ];
-        let mut ramps = Ramps::new(Point::X, ends);
-        let mut other = Ramps::new(Point::X, ends);
+        let mut ramps = ProfileBuilder::new(Point::X, ends);
+        let mut other = ProfileBuilder::new(Point::X, ends);
         for (k, &(low, high, load)) in bodies.iter().enumerate() {
             let to = if k % 2 == 0 { &mut ramps } else { &mut other };
             to.add(low, high, load, 2.0 * load);

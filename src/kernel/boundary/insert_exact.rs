@@ -1,9 +1,9 @@
-//! Puts an exact point into a small cavity that sees it whole.
+//! Inserts an exact point into a small cavity, all of whose faces it sees.
 
+use super::complex::TetComplex;
 use super::exact::ExactPoint;
-use super::grow::{Grown, grow};
-use super::patch::Patch;
-use super::space::Space;
+use super::grow::{GrownCavity, grow};
+use super::patch::RecoveryPatch;
 use super::walk::swapped;
 use crate::mesh::Tet;
 use tetdb_base::geom::IdSet;
@@ -12,7 +12,7 @@ use tetdb_base::storage::Pages;
 /// An outer face of a cavity, as a tetrahedron of the cavity and the vertex opposite the face.
 pub(super) type Outer = (Tet, usize);
 
-impl<P: Pages> Patch<'_, P> {
+impl<P: Pages> RecoveryPatch<'_, P> {
     /// The outer faces of a cavity.
     pub(super) fn outer_faces(&mut self, cavity: &[u32]) -> Vec<Outer> {
         let mut outer = Vec::new();
@@ -27,7 +27,7 @@ impl<P: Pages> Patch<'_, P> {
 
     /// Replaces the cavity by the point joined to its outer faces, if the point sees them all from inside.
     ///
-    /// `on` are the corners of what the point lies on.
+    /// `on` are the corners of the segment or facet with the point.
     pub(super) fn star(
         &mut self,
         cavity: &[u32],
@@ -45,7 +45,7 @@ impl<P: Pages> Patch<'_, P> {
         Some(x)
     }
 
-    /// The same, where the cavity may grow to be seen whole.
+    /// Like [`Self::star`], but the cavity may grow until the point sees all of it.
     pub(super) fn star_grown(
         &mut self,
         seed: &[u32],
@@ -54,7 +54,7 @@ impl<P: Pages> Patch<'_, P> {
     ) -> Option<u32> {
         let x = self.add_vertex_on(on, exact);
         let grown = grow(self, seed, x, None, &[], &IdSet::default());
-        let Ok(grown) = grown.and_then(Grown::losing_none) else {
+        let Ok(grown) = grown.and_then(GrownCavity::without_lost_vertices) else {
             self.drop_vertex(x);
             return None;
         };

@@ -1,12 +1,12 @@
-//! Write a child: the host's tetrahedra of one side, those of the core with that label, joined at the rim.
+//! Writes a child: the host's tetrahedra of one side and the core's of that label, joined at the core's boundary.
 //!
-//! Vertices and tetrahedra get their final numbers before they are written: those of vertices by sorting along the curve, those of
-//! tetrahedra by counting, for they follow that of their first vertex. Each record is then written once, at its place. What is read
-//! for it is read in page order, and of the host's tetrahedra those of the child alone: the scratch map says which.
+//! Vertices and tetrahedra get their final numbers before they are written. Vertices are sorted along the curve;
+//! tetrahedra are counted, since they follow their first vertex. Each record is then written once, at its place. Input
+//! is read in page order, and only the child's tetrahedra of the host are read, by the scratch map.
 
-use super::child::Split;
+use super::child_builder::ChildBuilder;
 use super::inherit::inherit;
-use super::opened::Opened;
+use super::open_cut::OpenCut;
 use crate::mesh::{Mesh, Workspace, dense};
 use tetdb_base::geom::{Aabb, HilbertFrame};
 use tetdb_base::storage::{Pages, StorageError};
@@ -14,26 +14,26 @@ use tetdb_base::storage::{Pages, StorageError};
 /// Writes one side into the empty `child`, numbered along the curve: vertices in the order of their positions, tetrahedra in that of
 /// their first vertex, those of the core before others.
 ///
-/// Effects: the core's scratch map is used up, that of the host holds the child's numbers in place of what led to them. Errors: the
-/// disk, while sorting.
+/// Effects: the core's scratch map is used up; the host's has the child's numbers in place of those from the
+/// extraction. Errors: the disk, while sorting.
 pub fn write_child<P: Pages, Q: Pages, R: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     child: &mut Mesh<R>,
-    opened: &Opened,
+    open_cut: &OpenCut,
     high: bool,
     bounds: &Aabb,
     space: &Workspace,
 ) -> Result<(), StorageError> {
-    let mut split = Split {
+    let mut split = ChildBuilder {
         host_base: dense(host.vertex_ids_end()),
         core_base: dense(core.vertex_ids_end()),
         host,
         core,
         child,
-        opened,
+        open_cut,
         high,
-        at_core: Vec::new(),
+        tets_at_core: Vec::new(),
     };
     split.add_vertices(&HilbertFrame::new(bounds), space)?;
     split.number_tets();

@@ -1,11 +1,11 @@
-//! The surface as seen from a point: how far it is, and which triangle lies above.
+//! Distances from points to a surface, and the triangle above a point.
 
-use super::broad::tree_of;
+use super::box_pairs::tree_of;
 use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point, mix};
 use crate::storage::ScratchSpace;
 
-/// Room on the stack of a walk through the tree: enough for most, so that it does not grow step by step.
+/// Initial capacity of the stack of a tree walk: enough for most, so that it does not grow step by step.
 const STACK: usize = 64;
 
 /// A triangle met by a line along z.
@@ -15,7 +15,7 @@ pub struct Crossing {
     pub triangle: u32,
     /// Where, in input units.
     pub z: f64,
-    /// Whether the triangle's front looks up.
+    /// True if the triangle's front looks up.
     pub front_is_up: bool,
 }
 
@@ -30,7 +30,8 @@ impl Crossing {
     }
 }
 
-/// Answers questions about one surface, which must stay as it is. Memory: that of its tree, about 70 bytes per triangle, or what the room allows.
+/// Distances to one surface, and crossings of lines with it. The surface must not change. Memory: about 70 bytes per
+/// triangle for the tree, less if it spills.
 pub struct Seeker<'a> {
     surface: &'a Surface,
     tree: BoxTree,
@@ -39,18 +40,18 @@ pub struct Seeker<'a> {
 impl<'a> Seeker<'a> {
     /// Sees all triangles of the surface.
     pub fn new(surface: &'a Surface) -> Self {
-        Self::of(surface, &ScratchSpace::boundless(), |_| true)
+        Self::with_filter(surface, &ScratchSpace::boundless(), |_| true)
     }
 
     /// Sees the triangles that `keep` accepts alone.
     ///
     /// A scratch file that fails unwinds, here and later.
-    pub fn of(
+    pub fn with_filter(
         surface: &'a Surface,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
         keep: impl Fn(u32) -> bool + Sync,
     ) -> Self {
-        Self::with_tree(surface, tree_of(surface, room, keep))
+        Self::with_tree(surface, tree_of(surface, scratch, keep))
     }
 
     /// Sees the triangles that `tree` has.
@@ -98,7 +99,7 @@ impl<'a> Seeker<'a> {
                 let from = stack.len();
                 let children = self.tree.children(level, node);
                 stack.extend(children.map(|c| (level - 1, c, distance2(&below.get(c), p))));
-                // The nearest is looked at first.
+                // The nearest child is visited first.
                 stack[from..].sort_by(|a, b| b.2.total_cmp(&a.2).then(b.1.cmp(&a.1)));
                 continue;
             }
@@ -138,9 +139,10 @@ impl<'a> Seeker<'a> {
         all
     }
 
-    /// How many triangles a question looks at, in the mean of some points: half of them where long thin ones fan out, some tens else.
+    /// Mean number of triangles tested per search, from some points: half of all for fans of long thin triangles,
+    /// otherwise tens.
     pub fn effort(&self) -> f64 {
-        /// Enough to tell some tens from thousands.
+        /// Enough probes to distinguish tens from thousands.
         const PROBES: u64 = 64;
         let bounds = self.surface.bounds();
         let looked_at = (0..PROBES).map(|i| {
@@ -151,8 +153,8 @@ impl<'a> Seeker<'a> {
         looked_at.sum::<usize>() as f64 / PROBES as f64
     }
 
-    /// Calls `visit` on the crossings in boxes from `low` up; it returns up to where others are wanted. Returns how many triangles were
-    /// looked at.
+    /// Calls `visit` on the crossings in boxes from `low` up. `visit` returns the largest z of interest. Returns the
+    /// number of triangles tested.
     fn each_crossing(&self, p: Point, low: f64, mut visit: impl FnMut(Crossing) -> f64) -> usize {
         let mut high = f64::INFINITY;
         let mut n = 0;

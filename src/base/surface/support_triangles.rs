@@ -1,19 +1,20 @@
-//! Fins: what holds the edges of wires.
+//! Support triangles: sheets of one triangle that keep embedded edges.
 //!
 //! ```text
-//!            c           Every step of the mesher keeps triangles, and none of them edges. So an edge a b that no triangle has
-//!          /   \         gets one of its own, with a vertex c beside its middle that nothing else uses: a sheet of one
-//!    a --/-------\-- b   triangle. What keeps sheets keeps it whole, and with it the edge, bit for bit and undivided.
+//!            c           Every step of the mesher keeps triangles, but no step keeps edges. So an edge a b without a triangle
+//!          /   \         gets one, with a vertex c near its middle that nothing else uses: a sheet of one triangle.
+//!    a --/-------\-- b   Sheets stay whole, and with them the edge, bit for bit and undivided.
 //! ```
 //!
-//! Fins of two edges stay apart by their height alone: it is below half of the distance of edges that share no vertex, and below half the
-//! angle of those that do. What they are to triangles is tried, by exact signs, in eight directions around the edge.
+//! Support triangles of two edges stay apart by their height alone. It is below half of the distance of edges that
+//! share no vertex, and below half the angle of those that do. Their contacts with other triangles are tested, by exact
+//! signs, in eight directions around the edge.
 
 use super::contact::contact;
+use super::embedded::NEAR_SHARE;
+use super::embedded_set::EmbedError;
 use super::point_tree::PointTree;
-use super::seek::Seeker;
-use super::wire_set::WireError;
-use super::wires::NEAR_SHARE;
+use super::seeker::Seeker;
 use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
@@ -21,11 +22,12 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Height of an equilateral triangle.
 const EQUILATERAL: f64 = 0.866;
-/// Heights are at most this share of what is left to others: below one half two of them do not meet, and a tetrahedron fits between.
+/// Heights are at most this share of the distance to other edges and points: below one half, two support triangles do
+/// not meet, and a tetrahedron fits between.
 const DISTANCE_SHARE: f64 = 0.4;
-/// The same of the tangent of half an angle, which is what is left where two edges meet.
+/// Heights are at most this share of the tangent of half the angle where two edges meet.
 const ANGLE_SHARE: f64 = 0.8;
-/// A vertex of a fin is at least this share of the fin's height away from triangles, or there is no room for good tetrahedra between.
+/// Distance of an apex from other triangles, as a share of its height, at least. Nearer apexes force bad tetrahedra.
 const CLEAR_SHARE: f64 = 0.35;
 /// Around an edge, as cosine and sine.
 const DIRECTIONS: [[f64; 2]; 8] = {
@@ -34,20 +36,20 @@ const DIRECTIONS: [[f64; 2]; 8] = {
 };
 
 impl Surface {
-    /// Adds a fin for each edge that `is_free`. Errors: edges too near to something else.
-    pub(super) fn add_fins(
+    /// Adds a support triangle for each edge with `is_free`. Errors: edges too near to something else.
+    pub(super) fn push_support_triangles(
         &mut self,
         is_free: &[bool],
         triangles: BoxTree,
-        room: &ScratchSpace,
-    ) -> Result<(), WireError> {
+        scratch: &ScratchSpace,
+    ) -> Result<(), EmbedError> {
         let least = NEAR_SHARE * self.bounds().diagonal();
         let seeker = Seeker::with_tree(self, triangles);
         self.refuse_near_ends(&seeker)?;
-        let heights = self.heights(is_free, room);
+        let heights_max = self.heights_max(is_free, scratch);
         let mut apexes = Vec::new();
         let mut near = Vec::new();
-        for (e, height) in heights.into_iter().enumerate().filter(|(e, _)| is_free[*e]) {
+        for (e, height) in heights_max.into_iter().enumerate().filter(|(e, _)| is_free[*e]) {
             match self.apex(e as u32, height, least, &seeker) {
                 Some(apex) => apexes.push((e, apex)),
                 None => near.push(e),
@@ -57,10 +59,10 @@ impl Surface {
         if apexes.is_empty() {
             return Ok(());
         }
-        self.wires.fins = Some([self.triangles.len() as u32, self.points.len() as u32]);
+        self.embedded.first_support = Some([self.triangles.len() as u32, self.points.len() as u32]);
         self.sheets.resize(self.triangles.len(), false);
         for (e, apex) in apexes {
-            let [a, b, label] = self.wires.edges[e];
+            let [a, b, label] = self.embedded.edges[e];
             self.triangles.push([a, b, self.points.len() as u32]);
             self.labels.push(label);
             self.sheets.push(true);
@@ -69,22 +71,22 @@ impl Surface {
         Ok(())
     }
 
-    /// How high the fin of each edge may be, for the other edges and the points.
-    fn heights(&self, is_free: &[bool], room: &ScratchSpace) -> Vec<f64> {
-        let edges = self.wire_tree(room, |e| is_free[e as usize]);
-        let marks = self.wires.points.iter().map(|&[v, _]| (v, self.points[v as usize]));
+    /// Greatest height of the support triangle of each edge, limited by other edges and points.
+    fn heights_max(&self, is_free: &[bool], scratch: &ScratchSpace) -> Vec<f64> {
+        let edges = self.embedded_edge_tree(scratch, |e| is_free[e as usize]);
+        let marks = self.embedded.points.iter().map(|&[v, _]| (v, self.points[v as usize]));
         let marks = PointTree::new(marks.collect());
-        let mut heights = vec![0.0; is_free.len()];
-        for (e, height) in (0u32..).zip(&mut heights).filter(|(e, _)| is_free[*e as usize]) {
-            let edge = self.wire(e);
+        let mut heights_max = vec![0.0; is_free.len()];
+        for (e, height) in (0u32..).zip(&mut heights_max).filter(|(e, _)| is_free[*e as usize]) {
+            let edge = self.embedded_edge(e);
             let [a, b] = edge.ends;
             let length = a.distance(b);
             *height = EQUILATERAL * length;
-            // What is farther leaves room enough.
+            // Parts farther away do not limit the height.
             let reach = Point::splat(*height / DISTANCE_SHARE);
             let around = Aabb { low: a.min(b) - reach, high: a.max(b) + reach };
             edges.meeting(&around, |f| {
-                let other = self.wire(f);
+                let other = self.embedded_edge(f);
                 let share = edge.ids.iter().position(|v| other.ids.contains(v));
                 let most = match share {
                     _ if f == e => return,
@@ -104,12 +106,12 @@ impl Surface {
                 }
             });
         }
-        heights
+        heights_max
     }
 
-    /// The vertex beside edge `e`, `height` away or less, that leaves most room to the triangles; none below `least`.
+    /// The apex at edge `e`, at `height` or less, with the largest distance from other triangles; `None` below `least`.
     fn apex(&self, e: u32, mut height: f64, least: f64, seeker: &Seeker) -> Option<Point> {
-        let edge = self.wire(e);
+        let edge = self.embedded_edge(e);
         let [a, b] = edge.ends;
         let along = (b - a).normalize();
         let side = along.any_orthonormal_vector();

@@ -1,16 +1,16 @@
-//! A sub-domain between the choice of its interface and its two children.
+//! A sub-domain with a chosen interface, before its two children are written.
 
 use super::core::CoreBoundary;
-use super::labels::Labels;
 use super::report::CutReport;
+use super::side_labels::SideLabels;
 use super::zone::Zone;
 
 /// A sub-domain cut open: its interface is chosen, the children are not yet written.
-pub struct Opened {
+pub struct OpenCut {
     /// The refined zone of the cut.
     pub zone: Zone,
-    /// How the cut went.
+    /// Report of the cut.
     pub report: CutReport,
-    pub(super) rim: CoreBoundary,
-    pub(super) labels: Labels,
+    pub(super) core_boundary: CoreBoundary,
+    pub(super) labels: SideLabels,
 }

@@ -1,25 +1,25 @@
-//! Wires: edges and points inside a volume that the mesh has as its edges and vertices.
+//! Embedded edges and points: edges and vertices that the mesh must have inside a volume.
 
 use super::contact::ContactKind;
 use crate::geom::Point;
 use tetdb_schema::code::Code;
 
-/// Edges and points of a surface that are no parts of its triangles, or are to be known by a name of their own.
+/// Embedded edges and points: not parts of triangles, or parts with a name of their own.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Wires {
+pub struct Embedded {
     /// The vertices of each edge, and its label.
     pub edges: Vec<[u32; 3]>,
     /// The vertex of each point, and its label.
     pub points: Vec<[u32; 2]>,
-    /// How long edges at each point should be, at most; 0 where the point is a vertex of triangles, which say it.
+    /// Largest edge length at each point; 0 for a vertex of triangles, which define it.
     pub sizes: Vec<f64>,
-    /// The first triangle that is a fin, and the first vertex that belongs to fins alone.
-    pub fins: Option<[u32; 2]>,
+    /// The first support triangle, and the first vertex that only support triangles have.
+    pub first_support: Option<[u32; 2]>,
 }
 
-/// What a file says of edges and points.
+/// Edges and points read from a file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct WireSet {
+pub struct EmbeddedSet {
     /// Positions of the vertices, equal ones among them.
     pub points: Vec<Point>,
     /// The vertices of each edge, and its label.
@@ -30,7 +30,7 @@ pub struct WireSet {
     pub label_names: Vec<String>,
 }
 
-impl WireSet {
+impl EmbeddedSet {
     /// Bytes of memory held, for the budget.
     pub fn bytes(&self) -> u64 {
         let names = self.label_names.len() * 2 * size_of::<String>();
@@ -40,9 +40,9 @@ impl WireSet {
     }
 }
 
-/// Why edges and points cannot be embedded.
+/// Reasons why edges and points cannot be embedded.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum WireError {
+pub enum EmbedError {
     /// Both ends of an edge are one vertex.
     #[error("{edge} has no length")]
     NoLength {
@@ -61,30 +61,30 @@ pub enum WireError {
         /// Where.
         at: Point,
     },
-    /// It touches something elsewhere than in common vertices.
+    /// A contact outside common vertices.
     #[error("{what} and {other} meet where they should not: {kind}{}", more(*n))]
     Touching {
         /// The edge or the point.
         what: String,
         /// The triangle or the edge.
         other: String,
-        /// How they touch.
+        /// Kind of the contact.
         kind: ContactKind,
         /// Where.
         at: Point,
-        /// How many such pairs there are.
+        /// Number of such pairs.
         n: usize,
     },
-    /// There is no room for a tetrahedron of computable size.
+    /// A tetrahedron there would be too small to compute.
     #[error("{what} is nearer to something else than can be meshed{}{}", far(*distance), more(*n))]
     TooNear {
         /// The first of them, and at most nine others.
         what: String,
         /// Where.
         at: Point,
-        /// How far the first one is from it, if that is known.
+        /// Distance of the first one, if known.
         distance: Option<f64>,
-        /// How many there are.
+        /// Number of such edges or points.
         n: usize,
     },
 }
@@ -100,7 +100,7 @@ fn far(distance: Option<f64>) -> String {
     distance.map_or(String::new(), |distance| format!(": {distance:.1e} from it"))
 }
 
-impl WireError {
+impl EmbedError {
     /// The word for this error.
     pub fn code(&self) -> Code {
         match self {
@@ -111,7 +111,7 @@ impl WireError {
         }
     }
 
-    /// Where it is.
+    /// Position of the error.
     pub fn at(&self) -> Point {
         match self {
             Self::NoLength { at, .. }
@@ -121,7 +121,7 @@ impl WireError {
         }
     }
 
-    /// What to do about it.
+    /// A suggestion for the user.
     pub fn help(&self) -> &'static str {
         match self {
             Self::NoLength { .. } | Self::Repeated { .. } => {

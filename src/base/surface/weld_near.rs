@@ -1,4 +1,4 @@
-//! Joining points that are near each other, for surfaces whose seams do not quite meet.
+//! Joins points that are near each other, for surfaces whose seams do not quite meet.
 
 use std::collections::HashMap;
 
@@ -25,7 +25,7 @@ pub fn weld_near(surface: &mut Surface, distance: f64) -> usize {
     count_joined(&new_ids)
 }
 
-/// How many points [`weld_near`] would join to another.
+/// Number of points that [`weld_near`] would join to another.
 pub(super) fn n_near(surface: &Surface, distance: f64) -> usize {
     count_joined(&new_ids(surface, distance))
 }
@@ -41,7 +41,8 @@ fn count_joined(new_ids: &[u32]) -> usize {
     (0u32..).zip(new_ids).filter(|(v, id)| *v != **id).count()
 }
 
-/// The points kept so far, in cubes [`CUBE`] times as wide as the distance: what is near lies in at most eight of them, mostly in one.
+/// The points kept so far, in cubes [`CUBE`] times as wide as the distance: near points lie in at most eight of them,
+/// mostly in one.
 struct Retained {
     low: Point,
     distance: f64,

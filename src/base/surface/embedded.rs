@@ -1,73 +1,76 @@
-//! A surface with wires in it: they are added, checked and held.
+//! Embedded edges and points of a surface: adding, checking, supporting.
 //!
-//! A point is a vertex that no triangle uses. An edge that no triangle has is held by a fin: a triangle of its own beside it, see `fins`.
+//! An embedded point is a vertex that no triangle uses. An embedded edge that no triangle has gets a support triangle
+//! (`support_triangles`).
 
 use std::collections::HashMap;
 
 use super::contact::ContactKind;
+use super::embedded_contact::{
+    EdgeAtTriangle, EmbeddedEdge, has_area, is_on_edge, point_at_triangle,
+};
+use super::embedded_set::{EmbedError, Embedded, EmbeddedSet};
 use super::weld::PointTable;
-use super::wire_contact::{Edge, EdgeAtTriangle, has_area, is_on_edge, point_at_triangle};
-use super::wire_set::{WireError, WireSet, Wires};
 use super::{BoxTree, Surface, SurfaceError};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
 
-/// An edge or a point this near to something else, as a share of the box diagonal, is refused: a vertex beside it is rounded to some 1e-16
-/// of the diagonal, and directions must stay known to several digits.
+/// Edges and points nearer to another part than this share of the box diagonal are refused. A vertex next to them is
+/// rounded to about 1e-16 of the diagonal, and directions need several correct digits.
 pub(super) const NEAR_SHARE: f64 = 1e-10;
 
 /// Bytes it takes to embed an edge or a point.
 const BYTES_EACH: u64 = 256;
 
 impl Surface {
-    /// Whether it has embedded edges or points.
-    pub fn has_wires(&self) -> bool {
-        !self.wires.edges.is_empty() || !self.wires.points.is_empty()
+    /// Returns whether it has embedded edges or points.
+    pub fn has_embedded(&self) -> bool {
+        !self.embedded.edges.is_empty() || !self.embedded.points.is_empty()
     }
 
     /// Points that no triangle uses, and how long edges there should be at most.
-    pub fn lone_points(&self) -> Vec<(u32, f64)> {
-        let points = self.wires.points.iter().zip(&self.wires.sizes);
+    pub fn isolated_points(&self) -> Vec<(u32, f64)> {
+        let points = self.embedded.points.iter().zip(&self.embedded.sizes);
         let alone = points.filter(|(_, size)| **size > 0.0);
         alone.map(|(&[v, _], &size)| (v, size)).collect()
     }
 
-    /// Whether triangle `t` is not of the input, but holds an edge of a wire.
+    /// Returns whether triangle `t` is not part of the input, but supports an embedded edge.
     #[inline]
-    pub fn is_fin(&self, t: u32) -> bool {
-        self.wires.fins.is_some_and(|[first, _]| t >= first)
+    pub fn is_support_triangle(&self, t: u32) -> bool {
+        self.embedded.first_support.is_some_and(|[first, _]| t >= first)
     }
 
-    /// Number of triangles, without those that hold edges of wires.
-    pub fn n_own_triangles(&self) -> usize {
-        self.wires.fins.map_or(self.n_triangles(), |[first, _]| first as usize)
+    /// Number of triangles, without support triangles.
+    pub fn n_input_triangles(&self) -> usize {
+        self.embedded.first_support.map_or(self.n_triangles(), |[first, _]| first as usize)
     }
 
-    /// Number of vertices, without those that only hold edges of wires.
-    pub fn n_own_vertices(&self) -> usize {
-        self.wires.fins.map_or(self.n_vertices(), |[_, first]| first as usize)
+    /// Number of vertices, without those of support triangles alone.
+    pub fn n_input_vertices(&self) -> usize {
+        self.embedded.first_support.map_or(self.n_vertices(), |[_, first]| first as usize)
     }
 
-    /// Adds edges and points, and what holds them; vertices with the same coordinates become one.
+    /// Adds edges and points with their support triangles; vertices with the same coordinates become one.
     ///
-    /// Labels are called as those of sheets: see [`Surface::embed`].
+    /// Labels are named as those of sheets: see [`Surface::embed`].
     ///
     /// # Errors
-    /// [`SurfaceError::Wire`] with the place; [`SurfaceError::TooLarge`].
-    pub fn embed_wires(
+    /// [`SurfaceError::Embed`] with the place; [`SurfaceError::TooLarge`].
+    pub fn embed_set(
         &mut self,
-        other: &WireSet,
+        other: &EmbeddedSet,
         name: &str,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
     ) -> Result<(), SurfaceError> {
         let first = self.add_labels(&other.label_names, name);
-        self.add_wires(other, |label| first + label, room)?;
-        self.hold_wires(room)
+        self.push_embedded(other, |label| first + label, scratch)?;
+        self.add_support_triangles(scratch)
     }
 
-    /// Its edges and points by themselves, numbered in the order in which they first appear.
-    pub fn wire_set(&self) -> WireSet {
-        let mut set = WireSet::default();
+    /// The embedded edges and points alone, numbered in the order in which they first appear.
+    pub fn embedded_set(&self) -> EmbeddedSet {
+        let mut set = EmbeddedSet::default();
         let (mut verts, mut labels) = (HashMap::new(), HashMap::new());
         let mut vert = |v: u32, points: &mut Vec<Point>| {
             *verts.entry(v).or_insert_with(|| {
@@ -81,12 +84,12 @@ impl Surface {
                 names.len() as u32 - 1
             })
         };
-        for &[a, b, label] in &self.wires.edges {
+        for &[a, b, label] in &self.embedded.edges {
             let ends = [a, b].map(|v| vert(v, &mut set.points));
             let label = named(label, &mut set.label_names);
             set.edges.push([ends[0], ends[1], label]);
         }
-        for &[v, label] in &self.wires.points {
+        for &[v, label] in &self.embedded.points {
             let v = vert(v, &mut set.points);
             set.marks.push([v, named(label, &mut set.label_names)]);
         }
@@ -96,8 +99,12 @@ impl Surface {
     /// Adds edges and points whose labels are called as they are.
     ///
     /// # Errors
-    /// As [`Surface::embed_wires`].
-    pub fn embed_named(&mut self, set: &WireSet, room: &ScratchSpace) -> Result<(), SurfaceError> {
+    /// As [`Surface::embed_set`].
+    pub fn embed_named(
+        &mut self,
+        set: &EmbeddedSet,
+        scratch: &ScratchSpace,
+    ) -> Result<(), SurfaceError> {
         let known = self.label_names.iter().cloned().zip(0u32..);
         let mut known: HashMap<String, u32> = known.collect();
         let mut labels = Vec::new();
@@ -109,44 +116,44 @@ impl Surface {
             }
             labels.push(label);
         }
-        self.add_wires(set, |label| labels[label as usize], room)?;
-        self.hold_wires(room)
+        self.push_embedded(set, |label| labels[label as usize], scratch)?;
+        self.add_support_triangles(scratch)
     }
 
-    fn add_wires(
+    fn push_embedded(
         &mut self,
-        other: &WireSet,
+        other: &EmbeddedSet,
         label_of: impl Fn(u32) -> u32,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
     ) -> Result<(), SurfaceError> {
         // Tables of its vertices, edges and points, and trees over them.
         let needed = other.bytes() + BYTES_EACH * (other.edges.len() + other.marks.len()) as u64;
-        if needed > room.available() {
-            return Err(SurfaceError::WireMemory {
-                bytes_max: room.available(),
+        if needed > scratch.available() {
+            return Err(SurfaceError::EmbedMemory {
+                bytes_max: scratch.available(),
                 vertices: other.points.len(),
             });
         }
-        self.drop_fins();
-        let mut table = PointTable::of(&self.points);
+        self.drop_support_triangles();
+        let mut table = PointTable::new(&self.points);
         let mut vert = |points: &mut Vec<Point>, v: u32| {
             table.find_or_add(other.points[v as usize] + Point::ZERO, points)
         };
         for &[a, b, label] in &other.edges {
             let ends = [a, b].map(|v| vert(&mut self.points, v));
-            self.wires.edges.push([ends[0], ends[1], label_of(label)]);
+            self.embedded.edges.push([ends[0], ends[1], label_of(label)]);
         }
         for &[v, label] in &other.marks {
             let v = vert(&mut self.points, v);
-            self.wires.points.push([v, label_of(label)]);
+            self.embedded.points.push([v, label_of(label)]);
         }
-        SurfaceError::check_size("vertices", self.points.len() + self.wires.edges.len())?;
-        SurfaceError::check_size("triangles", self.n_triangles() + self.wires.edges.len())
+        SurfaceError::check_size("vertices", self.points.len() + self.embedded.edges.len())?;
+        SurfaceError::check_size("triangles", self.n_triangles() + self.embedded.edges.len())
     }
 
-    /// Without the triangles that hold edges of wires, and their vertices.
-    pub(super) fn drop_fins(&mut self) {
-        if let Some([triangle, vertex]) = self.wires.fins.take() {
+    /// Removes support triangles and their vertices.
+    pub(super) fn drop_support_triangles(&mut self) {
+        if let Some([triangle, vertex]) = self.embedded.first_support.take() {
             self.triangles.truncate(triangle as usize);
             self.labels.truncate(triangle as usize);
             self.sheets.truncate(triangle as usize);
@@ -157,64 +164,64 @@ impl Surface {
         }
     }
 
-    /// The same without edges and points.
-    pub fn without_wires(&self) -> Self {
+    /// A copy without embedded edges and points.
+    pub fn without_embedded(&self) -> Self {
         let mut plain = self.clone();
-        plain.drop_fins();
-        plain.wires = Wires::default();
+        plain.drop_support_triangles();
+        plain.embedded = Embedded::default();
         super::weld::drop_unused_points(&mut plain);
         super::weld::drop_unused_labels(&mut plain);
         plain
     }
 
-    /// Checks edges and points, adds fins, and finds the sizes at points.
+    /// Checks edges and points, adds support triangles, and finds the sizes at points.
     ///
     /// # Errors
-    /// As [`Surface::embed_wires`].
-    pub fn hold_wires(&mut self, room: &ScratchSpace) -> Result<(), SurfaceError> {
-        self.drop_fins();
-        if !self.has_wires() {
+    /// As [`Surface::embed_set`].
+    pub fn add_support_triangles(&mut self, scratch: &ScratchSpace) -> Result<(), SurfaceError> {
+        self.drop_support_triangles();
+        if !self.has_embedded() {
             return Ok(());
         }
         self.refuse_repeated()?;
-        let triangles = super::broad::tree_of(self, room, |t| has_area(&self.corners(t)));
-        let edges = self.wire_tree(room, |_| true);
+        let triangles = super::box_pairs::tree_of(self, scratch, |t| has_area(&self.corners(t)));
+        let edges = self.embedded_edge_tree(scratch, |_| true);
         let is_free = self.refuse_contacts(&triangles, &edges)?;
         drop(edges);
-        self.add_fins(&is_free, triangles, room)?;
-        self.set_sizes(room)
+        self.push_support_triangles(&is_free, triangles, scratch)?;
+        self.set_point_sizes(scratch)
     }
 
-    /// Edge `e` of the wires.
-    pub(super) fn wire(&self, e: u32) -> Edge {
-        let [a, b, _] = self.wires.edges[e as usize];
+    /// Embedded edge `e`.
+    pub(super) fn embedded_edge(&self, e: u32) -> EmbeddedEdge {
+        let [a, b, _] = self.embedded.edges[e as usize];
         let ids = [a, b];
-        Edge { ids, ends: ids.map(|v| self.points[v as usize]) }
+        EmbeddedEdge { ids, ends: ids.map(|v| self.points[v as usize]) }
     }
 
-    /// A tree over those edges of wires that `keep` accepts.
-    pub(super) fn wire_tree(
+    /// A tree over the embedded edges that `keep` accepts.
+    pub(super) fn embedded_edge_tree(
         &self,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
         keep: impl Fn(u32) -> bool + Sync,
     ) -> BoxTree {
-        let box_of = |e: u32| Aabb::around(self.wire(e).ends);
-        BoxTree::new(&self.bounds(), self.wires.edges.len() as u32, room, keep, box_of)
+        let box_of = |e: u32| Aabb::around(self.embedded_edge(e).ends);
+        BoxTree::new(&self.bounds(), self.embedded.edges.len() as u32, scratch, keep, box_of)
     }
 
-    /// What edge `e` is called in messages: its number among those of its label.
+    /// Name of edge `e` in messages: its number among the edges of its label.
     pub fn edge_name(&self, e: usize) -> String {
-        let labels = self.wires.edges[..=e].iter().map(|edge| edge[2]);
+        let labels = self.embedded.edges[..=e].iter().map(|edge| edge[2]);
         self.name_of("edge", labels)
     }
 
-    /// The same of point `p`.
+    /// Name of point `p` in messages: its number among the points of its label.
     pub fn point_name(&self, p: usize) -> String {
-        let labels = self.wires.points[..=p].iter().map(|point| point[1]);
+        let labels = self.embedded.points[..=p].iter().map(|point| point[1]);
         self.name_of("point", labels)
     }
 
-    /// `labels`: of the wires up to the one to be named.
+    /// `labels`: labels of all edges (or points) up to the one to be named.
     fn name_of(&self, kind: &str, labels: impl DoubleEndedIterator<Item = u32>) -> String {
         let mut labels = labels.rev();
         let label = labels.next().unwrap_or_default();
@@ -222,34 +229,35 @@ impl Surface {
         format!("{kind} {number} of {:?}", self.label_names[label as usize])
     }
 
-    fn refuse_repeated(&self) -> Result<(), WireError> {
+    fn refuse_repeated(&self) -> Result<(), EmbedError> {
         let mut known = HashMap::new();
-        for (e, &[a, b, _]) in self.wires.edges.iter().enumerate() {
+        for (e, &[a, b, _]) in self.embedded.edges.iter().enumerate() {
             let at = self.points[a as usize].midpoint(self.points[b as usize]);
             if a == b {
-                return Err(WireError::NoLength { edge: self.edge_name(e), at });
+                return Err(EmbedError::NoLength { edge: self.edge_name(e), at });
             }
             if let Some(other) = known.insert([a.min(b), a.max(b)], e) {
                 let [what, other] = [e, other].map(|e| self.edge_name(e));
-                return Err(WireError::Repeated { what, other, at });
+                return Err(EmbedError::Repeated { what, other, at });
             }
         }
         let mut known = HashMap::new();
-        for (p, &[v, _]) in self.wires.points.iter().enumerate() {
+        for (p, &[v, _]) in self.embedded.points.iter().enumerate() {
             if let Some(other) = known.insert(v, p) {
                 let [what, other] = [p, other].map(|p| self.point_name(p));
-                return Err(WireError::Repeated { what, other, at: self.points[v as usize] });
+                return Err(EmbedError::Repeated { what, other, at: self.points[v as usize] });
             }
         }
         Ok(())
     }
 
-    /// Of each edge whether no triangle has it. Errors: what touches triangles and edges elsewhere than in common vertices.
+    /// Returns for each edge whether no triangle has it. Errors: contacts of edges and points with triangles or edges
+    /// outside common vertices.
     fn refuse_contacts(
         &self,
         triangles: &BoxTree,
         edges: &BoxTree,
-    ) -> Result<Vec<bool>, WireError> {
+    ) -> Result<Vec<bool>, EmbedError> {
         let mut first = None;
         let mut n = 0;
         let mut touch = |what: &dyn Fn() -> String, other: &dyn Fn() -> String, kind, at| {
@@ -257,25 +265,27 @@ impl Surface {
             first.get_or_insert_with(|| (what(), other(), kind, at));
         };
         let triangle_name = |t: u32| format!("triangle {t} of {:?}", self.label_name(t));
-        let mut is_free = vec![true; self.wires.edges.len()];
+        let mut is_free = vec![true; self.embedded.edges.len()];
         for (e, is_free) in is_free.iter_mut().enumerate() {
-            let edge = self.wire(e as u32);
+            let edge = self.embedded_edge(e as u32);
             let bounds = Aabb::around(edge.ends);
             let what = || self.edge_name(e);
             triangles.meeting(&bounds, |t| {
                 match edge.at_triangle(self.corners(t), self.triangles[t as usize]) {
                     EdgeAtTriangle::Apart => {}
-                    EdgeAtTriangle::Own => *is_free = false,
+                    EdgeAtTriangle::Side => *is_free = false,
                     EdgeAtTriangle::Touching(c) => touch(&what, &|| triangle_name(t), c.kind, c.at),
                 }
             });
             edges.meeting(&bounds, |f| {
-                if let Some(c) = (f as usize > e).then(|| edge.at_edge(&self.wire(f))).flatten() {
+                if let Some(c) =
+                    (f as usize > e).then(|| edge.at_edge(&self.embedded_edge(f))).flatten()
+                {
                     touch(&what, &|| self.edge_name(f as usize), c.kind, c.at);
                 }
             });
         }
-        for (i, &[v, _]) in self.wires.points.iter().enumerate() {
+        for (i, &[v, _]) in self.embedded.points.iter().enumerate() {
             let p = self.points[v as usize];
             let bounds = Aabb::around([p]);
             let what = || self.point_name(i);
@@ -287,7 +297,7 @@ impl Surface {
                 }
             });
             edges.meeting(&bounds, |e| {
-                let edge = self.wire(e);
+                let edge = self.embedded_edge(e);
                 if !edge.ids.contains(&v) && is_on_edge(p, edge.ends) {
                     touch(&what, &|| self.edge_name(e as usize), ContactKind::VertexOnEdge, p);
                 }
@@ -295,7 +305,7 @@ impl Surface {
         }
         match first {
             None => Ok(is_free),
-            Some((what, other, kind, at)) => Err(WireError::Touching { what, other, kind, at, n }),
+            Some((what, other, kind, at)) => Err(EmbedError::Touching { what, other, kind, at, n }),
         }
     }
 }

@@ -1,61 +1,59 @@
-//! Sizes of a part that is meshed again: wanted lengths inside, what it has along the faces that stay.
+//! Sizes of a sub-domain that is meshed again: wanted lengths inside, current lengths along its skin.
 //!
 //! ```text
-//!   h  had ----.            .---- had     The faces of the skin stay as they are, and so do lengths at them. Away from
-//!               `.        .'              them lengths go to the wanted ones as the slope allows: no lower than the
-//!      wanted     `------'                cones below what the part has at its skin, no higher than those above it.
+//!   h  current -.           .-- current   The faces of the skin stay, and so do lengths at them. Away from them lengths
+//!                `.       .'              approach the wanted ones as fast as the slope allows: they stay between the
+//!      wanted      `-----'                cones below and above the current lengths at the skin.
 //!      skin                  skin
 //! ```
 //!
-//! Where the wanted length is what the part has, the result is what the part has, but for rounding: it has the same octree there, and a
-//! leaf may be as steep as it was. Where vertices go hangs on the last digits of lengths (of 20,000 tetrahedra in a steep field, a
-//! hundredth more or fewer), so a part of which nothing else is wanted keeps its field to the bit. Sizes from the skin's edges would not do: vertices next to each other differ far more than the slope
-//! allows on a surface of small and large triangles, and the large ones' cones reach over the zones of the small ones.
-
-use rayon::prelude::*;
+//! Where the wanted length is the current one, the result equals the current field, except for rounding: it has the
+//! same octree there, and a leaf may be as steep as before. The positions of vertices depend on the last digits of
+//! lengths (of 20,000 tetrahedra in a steep field, a hundredth more or fewer). So a part without a changed constraint
+//! keeps its field to the bit. Sizes from the skin's edges would not do. On a surface of small and large triangles,
+//! adjacent vertices differ far more than the slope allows, and the slopes of large ones reach over the zones of small
+//! ones.
 
 use super::SizingError;
-use super::bits::Bits;
 use super::constraint::SizeConstraint;
 use super::constraints::SizeConstraints;
-use super::corners::{Corners, PAIRS};
+use super::corners::{PAIRS, TreeCorners};
 use super::field::SizeField;
 use super::options::Targets;
 use super::seeds::Seeds;
 use super::tree::{LATTICE, Tree};
-use super::values::Maker;
+use super::values::CornerSizes;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{ScratchSpace, SpillVec};
 
-/// Wanted lengths that are off what the part has by no more than this share are the same: the octree is not divided for them.
+/// Wanted lengths that differ from the current ones by no more than this share are the same: the octree is not divided
+/// for them.
 const SAME: f64 = 0.01;
-/// Shapes beside the octree are brought into it up to this share. At a tenth, what suffices for a formula, lengths
-/// around a sphere come out up to a tenth larger than they were.
+/// Sizes of shapes next to the octree are sampled into it up to this error. At a tenth, which suffices for a formula,
+/// lengths around a sphere come out up to a tenth larger than they were.
 const BEND_MAX: f64 = 0.02;
-/// Where a shape ends sizes have a kink, in cells this many sizes wide. With two, a ball of a tenth of the length around it has 2.3 % fewer
-/// tetrahedra when it is made again with the same lengths.
+/// Where a shape ends, sizes have a kink; cells there are this many sizes wide. With two, a ball of a tenth of the
+/// length around it has 2.3 % fewer tetrahedra after remeshing with the same lengths.
 const CELLS_PER_SIZE: f64 = 1.0;
-/// Corners asked about side by side.
-const CORNERS_AT_ONCE: usize = 1 << 16;
 
 impl SizeField {
-    /// The field of `constraint` inside a skin that stays, of a part that has the lengths of this field: triangles index points.
-    /// `None`: nothing else is wanted than what the part has.
+    /// The field of `constraint` inside a fixed skin, for a part with the lengths of this field; triangles index
+    /// points. `None`: the constraint equals the current lengths.
     ///
-    /// Near the skin lengths are those of this field, away from it they tend to the wish as the slope `beta` allows, to smaller ones as
-    /// well as to larger ones. Where the wish is infinite (outside of what it knows) sizes are those around it, and those of
-    /// this field where nothing at all is wished. `room` changes nothing of it.
+    /// Near the skin lengths are those of this field. Away from it they approach the constraint as fast as the slope
+    /// `beta` allows, to smaller ones as well as to larger ones. Where the constraint is infinite, sizes are those
+    /// around it, or those of this field if no constraint is finite anywhere. The result does not depend on `scratch`.
     ///
-    /// Memory: beside the room 40 bytes a point and 16 a leaf.
+    /// Memory: besides the scratch space 40 bytes a point and 16 a leaf.
     /// # Errors
-    /// A skin without edges; a wish that is no size somewhere; more leaves than can be numbered.
+    /// A skin without edges; a constraint without a size somewhere; more leaves than can be numbered.
     pub fn within(
         &self,
         points: &[Point],
         triangles: &[[u32; 3]],
         constraint: &dyn SizeConstraint,
         beta: f64,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
     ) -> Result<Option<Self>, SizingError> {
         let frame = self.frame;
         let seeds = Seeds::with_sizes(points, triangles, frame, |p| self.h(p))?;
@@ -71,47 +69,48 @@ impl SizeField {
             beside: 1.0,
         };
         let tree = self.tree_within(points, &seeds, &constraints)?;
-        let mut corners = Corners::of(&tree, room);
-        let mut had = at_corners(&tree, &mut corners, frame.side, room, &|p| {
+        let mut corners = TreeCorners::new(&tree, scratch);
+        let mut current = at_corners(&tree, &mut corners, frame.side, scratch, &|p| {
             Ok(self.h(frame.low + p * frame.side))
         })?;
-        let mut wanted = at_corners(&tree, &mut corners, frame.side, room, &|p| {
+        let mut wanted = at_corners(&tree, &mut corners, frame.side, scratch, &|p| {
             constraint.h(frame.low + p * frame.side)
         })?;
-        if is_same(&tree, &mut corners, [&mut had, &mut wanted], &constraints) {
+        if is_same(&tree, &mut corners, [&mut current, &mut wanted], &constraints) {
             return Ok(None);
         }
-        let steeper = steeper(&tree, &mut corners, &mut had, beta, room);
-        let mut maker = Maker {
+        let slope_factor = slope_factor(&tree, &mut corners, &mut current, beta, scratch);
+        let mut sizes = CornerSizes {
             tree: &tree,
             corners: &mut corners,
             seeds: &seeds,
             beta,
-            steeper: Some(steeper),
-            room,
+            slope_factor: Some(slope_factor),
+            scratch,
         };
-        let (mut at_skin, nearest) = maker.gather(|seeds, v| seeds.h(v), true);
+        let (mut at_skin, nearest) = sizes.gather(|seeds, v| seeds.h(v), true);
         for i in 0..at_skin.len() {
             if at_skin.get(i).is_finite() {
-                at_skin.set(i, had.get(i));
+                at_skin.set(i, current.get(i));
             }
         }
-        let cones = nearest.map(|nearest| maker.cones(&mut at_skin, nearest));
-        let mut h = maker.fill(wanted);
+        let cones = nearest.map(|nearest| sizes.cones(&mut at_skin, nearest));
+        let mut h = sizes.fill(wanted);
         if let Some([mut lower, mut upper]) = cones {
             for i in 0..h.len() {
-                let had = had.get(i);
-                let wanted = Some(h.get(i)).filter(|h| h.is_finite()).unwrap_or(had);
-                // Rounded slopes are not to move what the part has.
-                let (low, high) = (lower.get(i).min(had), upper.get(i).max(had));
+                let current = current.get(i);
+                let wanted = Some(h.get(i)).filter(|h| h.is_finite()).unwrap_or(current);
+                // Rounded slopes must not change the current lengths.
+                let (low, high) = (lower.get(i).min(current), upper.get(i).max(current));
                 h.set(i, wanted.max(low).min(high));
             }
         }
-        maker.grading().grade_closed(&mut h);
-        Ok(Some(Self::of_corners(frame, beta, tree, corners, h, room)))
+        sizes.grading().grade_closed(&mut h);
+        Ok(Some(Self::from_corners(frame, beta, tree, corners, h, scratch)))
     }
 
-    /// As fine as this field and the wish are in the skin's box, and along the skin where they differ: there cones begin.
+    /// As fine as this field and the constraint in the skin's box, and along the skin where they differ: there the
+    /// slopes begin.
     fn tree_within(
         &self,
         points: &[Point],
@@ -120,13 +119,13 @@ impl SizeField {
     ) -> Result<Tree, SizingError> {
         let mut moved = Vec::new();
         for v in seeds.vertices() {
-            let had = seeds.h(v) * self.frame.side;
+            let current = seeds.h(v) * self.frame.side;
             let wanted = constraints.list[1].h(points[v as usize])?;
-            if wanted.is_finite() && (wanted - had).abs() > SAME * had {
+            if wanted.is_finite() && (wanted - current).abs() > SAME * current {
                 moved.push(v);
             }
         }
-        // A wanted length of nothing differs from any: cells along the skin are as fine as what is there.
+        // A wanted length of zero differs from any: cells along the skin are as fine as the seeds.
         let along_skin = Targets {
             hsiz: Some(0.0),
             hmin: None,
@@ -138,72 +137,56 @@ impl SizeField {
     }
 }
 
-/// A size at each corner, in units of the cube's side; `size` is asked in those, and answers in input units.
+/// A size at each corner, in units of the cube's side; `size` takes positions in those units and returns input units.
 fn at_corners(
     tree: &Tree,
-    corners: &mut Corners,
+    corners: &mut TreeCorners,
     side: f64,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
     size: &(dyn Fn(Point) -> Result<f64, SizingError> + Sync),
 ) -> Result<SpillVec<f32>, SizingError> {
-    let mut h = room.column(corners.n_corners, 0.0f32);
-    let mut is_known = Bits::new(corners.n_corners);
-    let mut places: Vec<(u32, Point)> = Vec::new();
-    let mut ask = |places: &mut Vec<(u32, Point)>| {
-        let asked: Result<Vec<f64>, _> = places.par_iter().map(|&(_, p)| size(p)).collect();
-        for ((id, _), size) in places.drain(..).zip(asked?) {
-            h.set(id as usize, (size / side) as f32);
-        }
-        Ok(())
+    let mut h = scratch.vec(corners.n_corners, 0.0f32);
+    let size_at = |at: [u32; 3]| {
+        let [x, y, z] = at.map(f64::from);
+        size(Point::new(x, y, z) * (1.0 / f64::from(LATTICE)))
     };
-    for (i, leaf) in tree.leaves().enumerate() {
-        for (c, id) in corners.of_leaf.get(i).into_iter().enumerate() {
-            if !is_known.set(id) {
-                let [x, y, z] = leaf.corner(c).map(f64::from);
-                places.push((id, Point::new(x, y, z) * (1.0 / f64::from(LATTICE))));
-            }
-        }
-        if places.len() >= CORNERS_AT_ONCE {
-            ask(&mut places)?;
-        }
-    }
-    ask(&mut places)?;
+    corners.sample(tree, &size_at, |id, size| h.set(id, (size / side) as f32))?;
     Ok(h)
 }
 
-/// Whether two lists of sizes are equal wherever leaves meet the box of the skin: the octree is as fine as either needs there.
+/// Returns whether two lists of sizes are equal wherever leaves meet the box of the skin: the octree is as fine as either needs there.
 fn is_same(
     tree: &Tree,
-    corners: &mut Corners,
-    [had, wanted]: [&mut SpillVec<f32>; 2],
+    corners: &mut TreeCorners,
+    [current, wanted]: [&mut SpillVec<f32>; 2],
     constraints: &SizeConstraints,
 ) -> bool {
     tree.leaves().enumerate().all(|(i, leaf)| {
         !constraints.is_in_bounds(leaf) || {
             let mut ids = corners.of_leaf.get(i).into_iter();
-            ids.all(|id| had.get(id as usize) == wanted.get(id as usize))
+            ids.all(|id| current.get(id as usize) == wanted.get(id as usize))
         }
     })
 }
 
-/// By leaf, the slope of what the part has between its corners, over `beta`; at least one.
-fn steeper(
+/// For each leaf, the slope of the current sizes between its corners, over `beta`; at least one.
+fn slope_factor(
     tree: &Tree,
-    corners: &mut Corners,
-    had: &mut SpillVec<f32>,
+    corners: &mut TreeCorners,
+    current: &mut SpillVec<f32>,
     beta: f64,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> SpillVec<f32> {
-    let mut steeper = room.column(corners.of_leaf.len(), 1.0f32);
+    let mut slope_factor = scratch.vec(corners.of_leaf.len(), 1.0f32);
     for (i, leaf) in tree.leaves().enumerate() {
-        let h = corners.of_leaf.get(i).map(|id| f64::from(had.get(id as usize)));
+        let h = corners.of_leaf.get(i).map(|id| f64::from(current.get(id as usize)));
         let slope = PAIRS.iter().fold(0.0f64, |most, &(a, b, distance2)| {
             let distance = f64::from(distance2).sqrt() * leaf.side();
             most.max((h[a as usize] - h[b as usize]).abs() / distance)
         });
-        steeper.set(i, (slope / beta).max(1.0) as f32);
+        slope_factor.set(i, (slope / beta).max(1.0) as f32);
     }
-    steeper
+    slope_factor
 }
 
 #[cfg(test)]
@@ -211,7 +194,7 @@ mod tests {
     use super::*;
     use crate::sizing::SizeOptions;
 
-    fn room() -> ScratchSpace {
+    fn scratch() -> ScratchSpace {
         ScratchSpace::boundless()
     }
 
@@ -252,9 +235,10 @@ mod tests {
         let (points, triangles) = skin();
         let beta = 1.3f64.ln();
         for constraint in [0.03, 0.1, 0.2] {
-            let had = SizeField::build(&points, &triangles, &SizeOptions::default())
+            let current = SizeField::build(&points, &triangles, &SizeOptions::default())
                 .expect("a good surface");
-            let field = had.within(&points, &triangles, &Constant(constraint), beta, &room());
+            let field =
+                current.within(&points, &triangles, &Constant(constraint), beta, &scratch());
             let field = field.expect("a good skin").expect("another size");
             let middle = field.h(Point::splat(0.5));
             let reach = 0.5 * beta;
@@ -278,13 +262,13 @@ mod tests {
     #[test]
     fn no_size_is_an_error_and_nothing_wished_is_the_skins() {
         let (points, triangles) = skin();
-        let had = SizeField::build(&points, &triangles, &SizeOptions::default());
-        let had = had.expect("a good surface");
-        let field = had.within(&points, &triangles, &Constant(f64::INFINITY), 0.26, &room());
+        let current = SizeField::build(&points, &triangles, &SizeOptions::default());
+        let current = current.expect("a good surface");
+        let field = current.within(&points, &triangles, &Constant(f64::INFINITY), 0.26, &scratch());
         let field = field.expect("a good skin").expect("no size at all");
         let middle = field.h(Point::splat(0.5));
         assert!(middle > 0.1 && middle < 0.3, "{middle}");
-        assert!(had.within(&points, &[], &Constant(1.0), 0.26, &room()).is_err());
+        assert!(current.within(&points, &[], &Constant(1.0), 0.26, &scratch()).is_err());
     }
 
     /// A box of which one end is fine: the slope bounds sizes all along it.
@@ -315,15 +299,15 @@ mod tests {
                 Ok(self.0.h(p) * if is_there { 0.9 } else { 1.0 })
             }
         }
-        let (points, triangles, had) = graded();
+        let (points, triangles, current) = graded();
         let within = |wish: &dyn SizeConstraint| {
-            let field = had.within(&points, &triangles, wish, had.beta(), &room());
+            let field = current.within(&points, &triangles, wish, current.beta(), &scratch());
             field.expect("a good skin")
         };
-        assert!(within(&had).is_none());
-        let field = within(&But(&had)).expect("another length");
+        assert!(within(&current).is_none());
+        let field = within(&But(&current)).expect("another length");
         for p in places().filter(|p| p.x < 0.8) {
-            let (old, new) = (had.h(p), field.h(p));
+            let (old, new) = (current.h(p), field.h(p));
             assert!((new / old - 1.0).abs() < 1e-3, "{p} {old} {new}");
         }
     }
@@ -339,13 +323,19 @@ mod tests {
                 self.0.divides(middle, width)
             }
         }
-        let (points, triangles, had) = graded();
-        let mut before = had.clone();
+        let (points, triangles, current) = graded();
+        let mut before = current.clone();
         for share in [0.95, 0.8, 0.5] {
-            let field = had.within(&points, &triangles, &Share(&had, share), had.beta(), &room());
+            let field = current.within(
+                &points,
+                &triangles,
+                &Share(&current, share),
+                current.beta(),
+                &scratch(),
+            );
             let field = field.expect("a good skin").expect("other sizes");
             for p in places() {
-                let (old, new) = (had.h(p), field.h(p));
+                let (old, new) = (current.h(p), field.h(p));
                 assert!(new < old * 1.01 && new > 0.9 * share * old, "{p} {old} {new}");
                 assert!(new < before.h(p) * 1.1, "{p} {share}");
             }

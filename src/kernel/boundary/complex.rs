@@ -1,4 +1,4 @@
-//! One face for the two places where recovery works: the paged mesh, and a patch held in memory.
+//! One trait for the two complexes that recovery changes: the paged mesh, and a patch in memory.
 
 use crate::mesh::anatomy::{FACES, REQUIRED};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
@@ -7,12 +7,12 @@ use tetdb_base::storage::Pages;
 
 /// A tetrahedral complex whose parts can be replaced.
 ///
-/// Invariant kept by [`Space::replace`]: neighbors are mutual, and outer required faces stay required.
+/// Invariant kept by [`TetComplex::replace`]: neighbors are mutual, and outer required faces stay required.
 /// The caller answers for the volumes.
-pub(super) trait Space {
+pub(super) trait TetComplex {
     /// The record of `t`.
     fn tet(&mut self, t: u32) -> Tet;
-    /// What lies across face `i` of `t`; loads it if need be.
+    /// The face across face `i` of `t`; loads it if need be.
     fn across(&mut self, t: u32, i: usize) -> FaceRef;
     /// A tetrahedron that has `v`.
     fn tet_of(&mut self, v: u32) -> u32;
@@ -23,19 +23,19 @@ pub(super) trait Space {
     fn take_tet(&mut self) -> u32;
     fn free_tet(&mut self, t: u32);
     fn set_tet(&mut self, t: u32, tet: Tet);
-    /// Tells `face` its neighbor.
+    /// Sets the neighbor of `face`.
     fn set_across(&mut self, face: FaceRef, to: FaceRef);
     fn set_tet_of(&mut self, v: u32, t: u32);
-    /// Whether the edge `a b` must stay although no required face may have it yet.
+    /// Returns whether the edge `a b` must stay although no required face may have it yet.
     fn protects(&self, a: u32, b: u32) -> bool;
 
-    /// Replaces the tetrahedra `old` by tetrahedra with the vertices `new`, which fill the same room.
+    /// Replaces the tetrahedra `old` by tetrahedra with the vertices `new`, which fill the same volume.
     ///
-    /// Returns the ids of the new ones, parallel to `new`. Effects: ids of `old` are used again first, in order, and
-    /// what is left of them is freed last to first: replacing back restores the very ids. Required faces
+    /// Returns the ids of the new tetrahedra, parallel to `new`. Effects: ids of `old` are used again first, in order,
+    /// and the remaining ones are freed last to first, so that replacing back restores the same ids. Required faces
     /// stay required if they are faces of the new tetrahedra.
     fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) -> Vec<u32> {
-        let mut sides: Vec<Side> = Vec::with_capacity(4 * new.len() + 2 * old.len() + 4);
+        let mut sides: Vec<CavityFace> = Vec::with_capacity(4 * new.len() + 2 * old.len() + 4);
         // Required faces inside that are faces again afterwards stay required.
         let mut inner: Vec<[u32; 3]> = Vec::new();
         for &t in old {
@@ -47,7 +47,7 @@ pub(super) trait Space {
                         inner.push(sorted(tet.face(i)));
                     }
                 } else {
-                    sides.push(Side {
+                    sides.push(CavityFace {
                         key: sorted(tet.face(i)),
                         shapes: u32::MAX,
                         outside: across,
@@ -63,7 +63,7 @@ pub(super) trait Space {
         }
         for (k, quad) in new.iter().enumerate() {
             for (i, f) in FACES.iter().enumerate() {
-                sides.push(Side {
+                sides.push(CavityFace {
                     key: sorted(f.map(|j| quad[j])),
                     shapes: (k * 4 + i) as u32,
                     outside: FaceRef::NONE,
@@ -138,43 +138,43 @@ pub(super) trait Space {
 }
 
 /// A face of a replaced cavity, seen from outside (`shapes == MAX`) or from a new tetrahedron.
-struct Side {
+struct CavityFace {
     key: [u32; 3],
     shapes: u32,
     outside: FaceRef,
     required: bool,
 }
 
-/// The same three vertices, ascending.
+/// The three vertices, ascending.
 #[inline]
 pub(super) fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face.sort_unstable();
     face
 }
 
-/// Key of an edge, whatever its direction.
+/// Key of an edge in either direction.
 #[inline]
 pub(super) fn edge_key(a: u32, b: u32) -> u64 {
     u64::from(a.min(b)) << 32 | u64::from(a.max(b))
 }
 
-/// The paged mesh as a space; all vertices are where their coordinates say.
-pub(super) struct PagedSpace<'m, P: Pages>(
+/// The paged mesh as a complex; all vertices are at their coordinates.
+pub(super) struct PagedComplex<'m, P: Pages>(
     pub &'m mut Mesh<P>,
     /// Edges that must stay.
     pub &'m IdSet<u64>,
 );
 
-impl<P: Pages> PagedSpace<'_, P> {
+impl<P: Pages> PagedComplex<'_, P> {
     /// Adds a vertex in no tetrahedron, tagged as a Steiner point.
-    pub(super) fn add_steiner(&mut self, point: Point) -> u32 {
+    pub fn add_steiner(&mut self, point: Point) -> u32 {
         let v = self.0.add_vertex(point, 0.0);
         self.0.set_vertex_attribute(v, VertexTag::Steiner, 0);
         v
     }
 
     /// The face and its other side are required no longer.
-    pub(super) fn release(&mut self, face: FaceRef) {
+    pub fn release(&mut self, face: FaceRef) {
         for f in [face, self.0.tet(face.tet()).neighbor[face.face()]] {
             if f.exists() {
                 let mut tet = self.0.tet(f.tet());
@@ -184,19 +184,19 @@ impl<P: Pages> PagedSpace<'_, P> {
         }
     }
 
-    /// Whether `v` is not from the input.
-    pub(super) fn is_steiner(&mut self, v: u32) -> bool {
+    /// Returns whether `v` is not from the input.
+    pub fn is_steiner(&mut self, v: u32) -> bool {
         self.0.vertex_attribute(v).0 == VertexTag::Steiner
     }
 
     /// Takes back a vertex no tetrahedron has any more.
-    pub(super) fn drop_steiner(&mut self, v: u32) {
+    pub fn drop_steiner(&mut self, v: u32) {
         self.0.free_vertex(v);
         self.0.set_vertex_attribute(v, VertexTag::Free, 0);
     }
 }
 
-impl<P: Pages> Space for PagedSpace<'_, P> {
+impl<P: Pages> TetComplex for PagedComplex<'_, P> {
     #[inline]
     fn tet(&mut self, t: u32) -> Tet {
         self.0.tet(t)
