@@ -11,7 +11,7 @@ use super::report::FileCounts;
 use super::selection::{Content, Order, Selection};
 use super::wires_list::write_list;
 use super::writers::{Writers, is_first};
-use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtu, vtu_boundary};
+use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtk};
 
 /// Writes a mesh as one file, and what belongs to it; the tetrahedra of `.vtkhdf` as one of several `writers`, of whom the first does the rest.
 pub(super) fn write(
@@ -22,13 +22,13 @@ pub(super) fn write(
     out: &Path,
     writers: Option<&dyn Writers>,
 ) -> Result<FileCounts> {
-    let middles = match selection.order {
+    let midpoints = match selection.order {
         Order::First => None,
         Order::Second => Some(Midpoints::gather(mesh, format == MeshFormat::Gmsh)?),
     };
-    let middles = middles.as_ref();
+    let midpoints = midpoints.as_ref();
     let mut counts = FileCounts {
-        vertices: mesh.n_vertices() + middles.map_or(0, Midpoints::n),
+        vertices: mesh.n_vertices() + midpoints.map_or(0, Midpoints::n),
         tets: mesh.n_tets(),
         triangles: mesh.n_faces(),
     };
@@ -36,21 +36,21 @@ pub(super) fn write(
         MeshFormat::Vtu | MeshFormat::VtkHdf if selection.content != Content::Mesh => {
             mesh.expect_passes(1, 0);
             let is_hdf = format == MeshFormat::VtkHdf;
-            counts.vertices = vtu_boundary::write(mesh, draft, out, is_hdf, middles)?;
+            counts.vertices = vtk::write_boundary(mesh, draft, out, is_hdf, midpoints)?;
             counts.tets = 0;
         }
-        MeshFormat::Vtu | MeshFormat::Pvtu => vtu::write(mesh, draft, out, false, middles, None)?,
+        MeshFormat::Vtu | MeshFormat::Pvtu => vtk::write(mesh, draft, out, false, midpoints, None)?,
         MeshFormat::VtkHdf => {
-            vtu::write(mesh, draft, out, true, middles, writers)?;
+            vtk::write(mesh, draft, out, true, midpoints, writers)?;
             if !is_first(writers) {
                 return Ok(FileCounts::default());
             }
         }
         MeshFormat::Medit => medit::write_text(mesh, draft, out)?,
         MeshFormat::MeditBinary => medit::write_binary(mesh, draft, out)?,
-        MeshFormat::Gmsh => counts = gmsh::write(mesh, draft, out, (selection, middles))?,
+        MeshFormat::Gmsh => counts = gmsh::write(mesh, draft, out, (selection, midpoints))?,
         MeshFormat::Gmsh22 => gmsh22::write(mesh, draft, out)?,
-        MeshFormat::Abaqus => abaqus::write(mesh, draft, out, middles)?,
+        MeshFormat::Abaqus => abaqus::write(mesh, draft, out, midpoints)?,
         MeshFormat::Numpy => npy_columns::write(mesh, draft, out)?,
         #[cfg(feature = "parquet")]
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),

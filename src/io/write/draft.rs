@@ -102,6 +102,13 @@ impl Draft {
     }
 }
 
+impl Draft {
+    /// Publishes the one file; returns its length. Errors: as [`Draft::publish`].
+    pub fn publish_one(self) -> Result<u64> {
+        Ok(self.publish()?.iter().map(|(_, bytes)| bytes).sum())
+    }
+}
+
 impl Drop for Draft {
     fn drop(&mut self) {
         // Nothing depends on it; a folder that stays is only untidy.

@@ -9,14 +9,14 @@ use super::error::Result;
 use super::numbering::PartNumbers;
 use super::scope::Scope;
 use super::stream::{Records, Stream, scratch};
-use tetdb_base::storage::{SortRecord, Sorter, sort_record};
+use tetdb_base::storage::{Sorter, sort_record};
 
 /// Marks the key of an interface face, and sorts it behind the input triangles; below it the number of the cut, then of the face.
 const INTERFACE: u64 = 1 << 63;
 
 sort_record! {
     /// A boundary face in the merged mesh.
-    pub(super) struct Face {
+    pub(super) struct BoundaryFace {
         /// Number of the input triangle, or an interface face's cut and number in it.
         key: u64,
         /// On the side that is left out when both sides are written.
@@ -35,10 +35,7 @@ sort_record! {
     }
 }
 
-/// Bytes of a face in the scratch file.
-const BYTES: usize = size_of::<<Face as SortRecord>::Bytes>();
-
-impl Face {
+impl BoundaryFace {
     /// Its number in the input.
     pub fn triangle(&self) -> Option<u64> {
         (self.key < INTERFACE).then_some(self.key)
@@ -60,7 +57,7 @@ pub(super) struct FaceSource<'a> {
 
 /// Collects faces of one sub-domain after the other.
 pub(super) struct FaceSorter {
-    sorter: Sorter<Face>,
+    sorter: Sorter<BoundaryFace>,
     path: PathBuf,
 }
 
@@ -85,7 +82,7 @@ impl FaceSorter {
         let Some((side, tet)) = sides.filter_map(|side| Some((side, tet_of(side)?))).next() else {
             return Ok(());
         };
-        let face = Face {
+        let face = BoundaryFace {
             key: f.triangle,
             is_second: side != preferred,
             vertices: part.numbers.of(f.vertices)?,
@@ -108,7 +105,7 @@ impl FaceSorter {
         let Some(tet) = part.numbers.tet(f.tet) else {
             return Ok(());
         };
-        let face = Face {
+        let face = BoundaryFace {
             key: INTERFACE | u64::from(f.cut) << 32 | u64::from(f.index),
             is_second: false,
             vertices: part.numbers.of(f.vertices)?,
@@ -122,7 +119,7 @@ impl FaceSorter {
     }
 
     /// Ends collecting. Errors: the disk.
-    pub fn finish(self) -> Result<Faces> {
+    pub fn finish(self) -> Result<BoundaryFaces> {
         let mut file = FaceFile::create(self.path)?;
         let mut last = None;
         for face in self.sorter.finish()? {
@@ -135,9 +132,9 @@ impl FaceSorter {
     }
 }
 
-/// Faces being written to their scratch file.
+/// BoundaryFaces being written to their scratch file.
 struct FaceFile {
-    faces: Faces,
+    faces: BoundaryFaces,
     stream: Stream,
 }
 
@@ -145,46 +142,41 @@ impl FaceFile {
     fn create(path: PathBuf) -> Result<Self> {
         let stream = scratch(&path)?;
         let (n, labels) = (0, BTreeMap::new());
-        let faces = Faces { n, labels, path };
+        let faces = BoundaryFaces { n, labels, path };
         Ok(Self { faces, stream })
     }
 
-    fn put(&mut self, face: &Face) -> Result<()> {
+    fn put(&mut self, face: &BoundaryFace) -> Result<()> {
         self.faces.n += 1;
         *self.faces.labels.entry(face.label).or_default() += 1;
-        self.stream.bytes(&face.to_bytes());
-        self.stream.end()
+        self.stream.record(face)
     }
 
-    fn finish(self) -> Result<Faces> {
+    fn finish(self) -> Result<BoundaryFaces> {
         self.stream.finish()?;
         Ok(self.faces)
     }
 }
 
 /// All boundary faces, in a scratch file.
-pub(super) struct Faces {
+pub(super) struct BoundaryFaces {
     pub n: u64,
     /// How many faces each label has.
     pub labels: BTreeMap<u32, u64>,
     path: PathBuf,
 }
 
-impl Faces {
+impl BoundaryFaces {
     /// Every face, input triangles first. Errors: the disk, and those of `each`.
-    pub fn each(&self, mut each: impl FnMut(&Face) -> Result<()>) -> Result<()> {
-        let mut records = Records::<BYTES>::open(&self.path, 0)?;
-        while let Some(record) = records.next()? {
-            each(&Face::from_bytes(&record))?;
-        }
-        Ok(())
+    pub fn each(&self, each: impl FnMut(&BoundaryFace) -> Result<()>) -> Result<()> {
+        Records::open(&self.path, 0)?.each(each)
     }
 
     /// The faces that `each` puts for these, at `path`. Errors: the disk, those of `each`.
     pub fn rewritten(
         &self,
         path: &Path,
-        mut each: impl FnMut(&Face, &mut dyn FnMut(&Face) -> Result<()>) -> Result<()>,
+        mut each: impl FnMut(&BoundaryFace, &mut dyn FnMut(&BoundaryFace) -> Result<()>) -> Result<()>,
     ) -> Result<Self> {
         let mut file = FaceFile::create(path.to_owned())?;
         self.each(|face| each(face, &mut |face| file.put(face)))?;

@@ -4,24 +4,9 @@
 //! of any size be laid out before its first byte and be written by nobody but the operating system.
 //! Source: the HDF5 file format specification, version 3.0 (superblock 2, object headers 2); the checksum is Jenkins's `lookup3`.
 
-/// What an array's numbers are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Number {
-    U8,
-    U32,
-    I64,
-    F64,
-}
+use super::columns::Number;
 
 impl Number {
-    pub fn bytes(self) -> u64 {
-        match self {
-            Self::U8 => 1,
-            Self::U32 => 4,
-            Self::I64 | Self::F64 => 8,
-        }
-    }
-
     /// The message that describes it.
     fn datatype(self) -> Vec<u8> {
         let size = self.bytes() as u8;
@@ -30,7 +15,10 @@ impl Number {
             // Class 1, implied leading bit, sign in bit 63.
             Self::F64 => vec![0x11, 0x20, 63, 0, size, 0, 0, 0],
             // Class 0; bit 3 of the second byte is the sign.
-            _ => vec![0x10, 8 * u8::from(self == Self::I64), 0, 0, size, 0, 0, 0],
+            _ => {
+                let sign = 8 * u8::from(matches!(self, Self::I32 | Self::I64));
+                vec![0x10, sign, 0, 0, size, 0, 0, 0]
+            }
         };
         message.extend(precision);
         if self == Self::F64 {

@@ -8,20 +8,21 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
-use super::chosen::Chosen;
 use super::doubles::Doubles;
 use super::error::{Result, WriteError};
-use super::faces::{Face, FaceSorter, FaceSource, Faces};
-use super::numbering::{Numbering, PartNumbers, Sharer, Source, candidates, sharers};
-use super::on_surface::OnSurface;
+use super::faces::{BoundaryFace, BoundaryFaces, FaceSorter, FaceSource};
+use super::numbering::{
+    Numbering, PartNumbers, Sharer, Source, Subset, shareable_vertices, sharers,
+};
 use super::scope::{FaceSet, Scope};
 use super::wires::{WrittenWires, beside};
 use tetdb_base::shape::excess_near;
 use tetdb_base::storage::{Sorted, check_cancelled};
 use tetdb_schema::catalog::SubdomainRow;
+use tetdb_schema::record::NO_TET;
 use tetdb_store::sealed::SealedError;
-use tetdb_store::sealed::{Shape, Subdomain};
-use tetdb_store::store::{Catalog, StoreError};
+use tetdb_store::sealed::{FaceJoin, FaceJoinSorter, Shape, Subdomain};
+use tetdb_store::store::Catalog;
 
 /// Counts records and tells.
 pub(super) struct Progress<'a> {
@@ -46,7 +47,7 @@ impl<'a> Progress<'a> {
 }
 
 /// A tetrahedron of the merged mesh.
-pub(super) struct Tet {
+pub(super) struct MergedTet {
     /// Numbers of its vertices; positive volume in this order.
     pub nodes: [u64; 4],
     pub region: u32,
@@ -63,9 +64,9 @@ pub(super) struct Tet {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Measured {
     Nothing,
-    /// [`Tet::quality`].
+    /// [`MergedTet::quality`].
     Quality,
-    /// This and [`Tet::excess`].
+    /// This and [`MergedTet::excess`].
     Excess,
 }
 
@@ -94,10 +95,10 @@ pub(super) struct Merged<'a> {
     parts: Vec<Source>,
     regions: BTreeSet<u32>,
     numbering: Numbering,
-    faces: Faces,
+    faces: BoundaryFaces,
     doubles: Option<Doubles>,
     wires: WrittenWires,
-    fin_first: u64,
+    support_first: u64,
     label_names: Vec<String>,
     region_names: Vec<String>,
     dir: PathBuf,
@@ -145,7 +146,7 @@ impl<'a> Merged<'a> {
             faces,
             doubles: None,
             wires: WrittenWires::default(),
-            fin_first: row.fin_first,
+            support_first: row.fin_first,
             label_names,
             region_names,
             dir: dir.to_owned(),
@@ -170,8 +171,8 @@ impl<'a> Merged<'a> {
     }
 
     /// Facets from this number on are no triangles of the input: each holds an embedded edge.
-    pub fn fin_first(&self) -> u64 {
-        self.fin_first
+    pub fn support_first(&self) -> u64 {
+        self.support_first
     }
 
     /// Vertices and their doubles.
@@ -187,7 +188,7 @@ impl<'a> Merged<'a> {
     /// Puts the faces that `each` puts in the place of the ones it gets. Errors: the disk, those of `each`.
     pub fn rewrite_faces(
         &mut self,
-        each: impl FnMut(&Face, &mut dyn FnMut(&Face) -> Result<()>) -> Result<()>,
+        each: impl FnMut(&BoundaryFace, &mut dyn FnMut(&BoundaryFace) -> Result<()>) -> Result<()>,
     ) -> Result<()> {
         self.faces = self.faces.rewritten(&self.dir.join("split-faces"), each)?;
         Ok(())
@@ -220,7 +221,7 @@ impl<'a> Merged<'a> {
 
     /// Every vertex that several sub-domains have, by the places of these. Errors: damage, the disk.
     pub fn sharers(&mut self) -> Result<Sorted<Sharer>> {
-        let by_id = candidates(self.store, &self.parts, &self.dir, self.memory)?;
+        let by_id = shareable_vertices(self.store, &self.parts, &self.dir, self.memory)?;
         sharers(by_id, &self.dir, self.sorter_bytes())
     }
 
@@ -285,12 +286,9 @@ impl<'a> Merged<'a> {
         if expected == found {
             return Ok(());
         }
-        Err(StoreError::Sealed(SealedError::Content {
-            path: self.store.dir().to_owned(),
-            subdomain: self.parts.first().map_or(0, |source| source.row.rank),
-            what: format!("{found} {what} where {expected} were expected"),
-        })
-        .into())
+        let rank = self.parts.first().map_or(0, |source| source.row.rank);
+        let what = format!("{found} {what} where {expected} were expected");
+        Err(SealedError::content(self.store.dir(), rank, what).into())
     }
 
     /// Number of sub-domains.
@@ -306,7 +304,7 @@ impl<'a> Merged<'a> {
         self.faces.n
     }
 
-    pub fn faces(&self) -> &Faces {
+    pub fn faces(&self) -> &BoundaryFaces {
         &self.faces
     }
 
@@ -369,7 +367,11 @@ impl<'a> Merged<'a> {
                 let chunk = chunk?;
                 let end = u64::from(chunk.first) + chunk.records.len() as u64;
                 if end > row.vertices {
-                    return Err(too_many_vertices(self.store, row, end).into());
+                    let what = format!(
+                        "a chunk ends at vertex {end}, the catalog counts {}",
+                        row.vertices
+                    );
+                    return Err(part.damaged(what).into());
                 }
                 for (local, vertex) in (chunk.first..).zip(&chunk.records) {
                     if let Some(number) = numbers.own(local) {
@@ -387,7 +389,7 @@ impl<'a> Merged<'a> {
     }
 
     /// Every tetrahedron in the order of its number. Errors: damage, those of `each`.
-    pub fn tets(&mut self, each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
+    pub fn tets(&mut self, each: impl FnMut(&MergedTet) -> Result<()>) -> Result<()> {
         self.measured_tets(Measured::Nothing, each)
     }
 
@@ -395,7 +397,7 @@ impl<'a> Merged<'a> {
     pub fn measured_tets(
         &mut self,
         measured: Measured,
-        mut each: impl FnMut(&Tet) -> Result<()>,
+        mut each: impl FnMut(&MergedTet) -> Result<()>,
     ) -> Result<()> {
         let mut changes = self.doubles.as_ref().map(Doubles::changes).transpose()?;
         for p in self.window.clone() {
@@ -406,7 +408,7 @@ impl<'a> Merged<'a> {
                 Measured::Nothing | Measured::Quality => None,
                 Measured::Excess => {
                     let memory = self.memory as u64 / 8;
-                    Some(OnSurface::of_part(&mut part, &self.dir, memory)?)
+                    Some(required_faces(&mut part, &self.dir, memory)?)
                 }
             };
             let mut expected = 0;
@@ -415,7 +417,7 @@ impl<'a> Merged<'a> {
                 for (local, tet) in (chunk.first..).zip(&chunk.records) {
                     let id = TetId::new(part.id(), local)
                         .filter(|_| local == expected && u64::from(local) < row.tets);
-                    let id = id.ok_or_else(|| damaged(&part, local, expected))?;
+                    let id = id.ok_or_else(|| misplaced(&part, local, expected))?;
                     expected += 1;
                     let Some(number) = numbers.tet(local) else {
                         continue;
@@ -425,7 +427,7 @@ impl<'a> Merged<'a> {
                         let points = part.corners(tet.nodes)?.map(|c| c.point);
                         quality = Shape::of(points).quality;
                         if let Some(on_surface) = &mut on_surface {
-                            let faces = on_surface.faces(local, tet.nodes)?;
+                            let faces = on_surface.faces_of(local, tet.nodes)?;
                             excess = match faces.contains(&true) {
                                 true => excess_near(points, faces),
                                 false => quality,
@@ -436,7 +438,7 @@ impl<'a> Merged<'a> {
                     if let Some(changes) = &mut changes {
                         changes.apply(number, &mut nodes)?;
                     }
-                    each(&Tet {
+                    each(&MergedTet {
                         nodes,
                         region: tet.region,
                         subdomain: row.rank,
@@ -448,7 +450,7 @@ impl<'a> Merged<'a> {
                 self.progress.advance(chunk.records.len());
             }
             if u64::from(expected) != row.tets {
-                return Err(damaged(&part, row.tets as u32, expected).into());
+                return Err(misplaced(&part, row.tets as u32, expected).into());
             }
         }
         Ok(())
@@ -485,10 +487,10 @@ fn sources(store: &mut Catalog, scope: Scope, dir: &Path, memory: usize) -> Resu
         }
         let mut source = Source::from(row);
         if !scope.regions.is_empty() {
-            let path = dir.join(format!("chosen-{}", source.row.rank));
+            let path = dir.join(format!("subset-{}", source.row.rank));
             let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
-            [source.n_tets, source.n_vertices] = Chosen::gather(&mut part, scope.regions, &path)?;
-            source.chosen = Some(path);
+            [source.n_tets, source.n_vertices] = Subset::gather(&mut part, scope.regions, &path)?;
+            source.subset = Some(path);
         }
         if source.n_tets > 0 || scope.regions.is_empty() {
             sources.push(source);
@@ -497,34 +499,35 @@ fn sources(store: &mut Catalog, scope: Scope, dir: &Path, memory: usize) -> Resu
     Ok(sources)
 }
 
-fn damaged(part: &Subdomain, found: u32, expected: u32) -> StoreError {
-    StoreError::Sealed(SealedError::Content {
-        path: part.path().to_owned(),
-        subdomain: part.id().rank(),
-        what: format!("tetrahedron {found} stands where {expected} was expected"),
-    })
+/// Gathers the faces of a sub-domain's tetrahedra that are required: input triangles, and support triangles of embedded edges. Errors: damage, the disk.
+fn required_faces(part: &mut Subdomain, dir: &Path, memory: u64) -> Result<FaceJoin> {
+    let mut sorter = FaceJoinSorter::new(dir, memory);
+    for facet in part.facets() {
+        check_cancelled();
+        let facet = facet?;
+        for tet in facet.tets.into_iter().filter(|&tet| tet != NO_TET) {
+            sorter.push(tet, facet.vertices, false, 0)?;
+        }
+    }
+    Ok(sorter.finish()?)
 }
 
-fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> StoreError {
-    StoreError::Sealed(SealedError::Content {
-        path: catalog.file_path(row.rank, row.generation).path().to_owned(),
-        subdomain: row.rank,
-        what: format!("a chunk ends at vertex {end}, the catalog counts {}", row.vertices),
-    })
+fn misplaced(part: &Subdomain, found: u32, expected: u32) -> SealedError {
+    part.damaged(format!("tetrahedron {found} stands where {expected} was expected"))
 }
 
 /// Hands the faces of a sub-domain that its scope lists to `sorter`; interface faces are labelled by the sub-domain behind
-/// them, from `first_label` on; facets from `fin_first` on are no triangles of the input.
+/// them, from `first_label` on; facets from `support_first` on are no triangles of the input.
 fn collect_faces(
     from: &mut Subdomain,
     part: &FaceSource,
-    [first_label, fin_first]: [u64; 2],
+    [first_label, support_first]: [u64; 2],
     sorter: &mut FaceSorter,
 ) -> Result<()> {
     if part.scope.faces != FaceSet::Interfaces {
         for facet in from.facets() {
             let facet = facet?;
-            if facet.triangle < fin_first {
+            if facet.triangle < support_first {
                 sorter.push(&facet, part)?;
             }
         }

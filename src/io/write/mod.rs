@@ -11,8 +11,7 @@
 //! `numbering` (shared vertices), `faces` (its boundary), `draft` and `stream` (files), then one file or folder per format.
 
 mod abaqus;
-mod chosen;
-mod defects;
+mod columns;
 mod dispatch;
 mod doubles;
 mod draft;
@@ -31,13 +30,11 @@ mod names;
 mod npy;
 mod npy_columns;
 mod numbering;
-mod on_surface;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod pieces;
 mod report;
 mod scope;
-mod selected;
 mod selection;
 mod split;
 mod stream;
@@ -46,9 +43,7 @@ mod surface;
 mod tests;
 mod tetgen;
 mod topology;
-mod vtu;
-mod vtu_boundary;
-mod vtu_layout;
+mod vtk;
 mod wires;
 mod wires_list;
 mod writers;
@@ -56,7 +51,6 @@ mod writers;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-pub use defects::defects;
 use error::Result;
 pub use error::WriteError;
 pub use format::{ENDINGS, MeshFormat};
@@ -68,9 +62,9 @@ pub use npy::bytes;
 pub use npy::{NpyField, NpyTable};
 pub use report::ExportReport;
 use report::FileCounts;
-pub use selected::{SelectedTet, SelectedVtu};
 pub use selection::{Content, Order, Selection, Share};
 pub use surface::{SurfaceReport, surface, wires};
+pub use vtk::{SelectedTet, SelectedVtu, defects};
 
 use draft::{Draft, STDOUT};
 use merged::{Merged, Progress};

@@ -1,11 +1,12 @@
-//! NumPy's array files: a head that tells type and shape, then the numbers, little end first.
+//! NumPy's array files, and other files written front to back.
 //!
+//! An array file has a head with type and shape, then the numbers, little end first.
 //! Source: the NPY format, version 1.0, of NumPy's documentation (NEP 1).
 
 use std::path::{Path, PathBuf};
 
 use super::draft::Draft;
-use super::error::{Result, WriteError};
+use super::error::Result;
 use super::stream::{Stream, Strip};
 
 /// Bytes of every head written here: a multiple of 64, as the format asks, with room for any number of rows.
@@ -77,7 +78,7 @@ impl NpyTable {
         let mut strip = Strip::open(&self.path, 0, HEAD_BYTES as u64)?;
         strip.put(&head(&self.kind, self.rows, ""))?;
         strip.finish()?;
-        length(self.draft)
+        self.draft.publish_one()
     }
 }
 
@@ -106,7 +107,7 @@ impl TextFile {
     /// Gives the file its name; returns its length. Errors: the disk.
     pub fn finish(self) -> Result<u64> {
         self.out.finish()?;
-        length(self.draft)
+        self.draft.publish_one()
     }
 }
 
@@ -117,15 +118,5 @@ pub fn bytes(out: &Path, content: &[u8]) -> Result<u64> {
     let mut stream = Stream::open(&path)?;
     stream.bytes(content);
     stream.finish()?;
-    length(draft)
-}
-
-/// Publishes the one file of a draft.
-pub(super) fn length(draft: Draft) -> Result<u64> {
-    let files = draft.publish()?;
-    let [(_, bytes)] = files[..] else {
-        let (path, source) = (PathBuf::new(), std::io::Error::other("not one file"));
-        return Err(WriteError::Io { path, source });
-    };
-    Ok(bytes)
+    draft.publish_one()
 }

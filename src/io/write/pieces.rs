@@ -5,12 +5,13 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::columns::Number;
 use super::dispatch;
 use super::draft::Draft;
 use super::merged::{Merged, Progress};
 use super::scope::{FaceSet, Scope};
 use super::stream::Stream;
-use super::{FileCounts, MeshFormat, Result, Selection, WriteError};
+use super::{FileCounts, MeshFormat, Result, Selection, WriteError, vtk};
 use tetdb_store::store::Catalog;
 
 pub(super) fn write(
@@ -87,25 +88,16 @@ fn head(draft: &mut Draft, out: &Path, pieces: &[PathBuf]) -> Result<()> {
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
          header_type=\"UInt64\">\n  <PUnstructuredGrid GhostLevel=\"0\">\n",
     );
-    let groups: [(&str, &[(&str, &str)]); 2] = [
-        ("PPointData", &[("global_id", "Int64")]),
-        (
-            "PCellData",
-            &[
-                ("subdomain", "UInt32"),
-                ("region", "UInt32"),
-                ("quality", "Float64"),
-                ("excess", "Float64"),
-                ("global_id", "Int64"),
-            ],
-        ),
-    ];
-    for (group, arrays) in groups {
-        stream.text(&format!("    <{group}>\n"));
-        for (name, kind) in arrays {
-            stream.text(&format!("      <PDataArray type=\"{kind}\" Name=\"{name}\"/>\n"));
-        }
-        stream.text(&format!("    </{group}>\n"));
+    let arrays = |columns: Vec<(&str, Number)>| -> String {
+        let line = |(name, number): (&str, Number)| {
+            format!("      <PDataArray type=\"{}\" Name=\"{name}\"/>\n", number.vtk())
+        };
+        columns.into_iter().map(line).collect()
+    };
+    let points = vtk::vertex_columns().iter().map(|c| (c.name, c.number)).collect();
+    let cells = vtk::tet_columns().iter().map(|c| (c.name, c.number)).collect();
+    for (group, columns) in [("PPointData", points), ("PCellData", cells)] {
+        stream.text(&format!("    <{group}>\n{}    </{group}>\n", arrays(columns)));
     }
     stream.text("    <PPoints>\n      <PDataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"/>\n    </PPoints>\n");
     for piece in pieces {

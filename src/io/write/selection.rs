@@ -72,7 +72,7 @@ pub enum Order {
     /// Corners.
     #[default]
     First,
-    /// Corners and the middles of edges.
+    /// Corners and the midpoints of edges.
     Second,
 }
 

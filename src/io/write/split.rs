@@ -9,15 +9,16 @@ use std::path::Path;
 use super::doubles::{Change, Double, Doubles};
 use super::draft::Draft;
 use super::error::Result;
-use super::faces::Face;
+use super::faces::BoundaryFace;
 use super::merged::Merged;
-use super::stream::{Records, Stream, here, scratch};
-use tetdb_base::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
+use super::stream::{Records, Stream, save, scratch};
+use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
 use tetdb_schema::record::FACES;
+use tetdb_store::sealed::MergeReader;
 
 sort_record! {
     /// A tetrahedron at a vertex of a sheet.
-    struct Corner {
+    struct TetCorner {
         vertex: u64,
         tet: u64,
         subdomain: u32,
@@ -61,25 +62,20 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     let originals = dir.join("doubled");
     let mut stream = scratch(&originals)?;
     let mut n = 0;
-    let mut corners = corners.peekable();
-    let mut face_corners = face_corners.peekable();
-    while let Some(first) = corners.next() {
-        let first = first?;
-        let vertex = first.vertex;
-        let mut tets = vec![first];
-        while let Some(next) = corners.next_if(|c| here(c, |c| c.vertex == vertex)) {
-            tets.push(next?);
-        }
+    let (mut corners, mut face_corners) =
+        (MergeReader::new(corners), MergeReader::new(face_corners));
+    let mut tets = Vec::new();
+    while corners.next_group(&mut tets, |a, b| a.vertex == b.vertex)? {
+        let vertex = tets[0].vertex;
         let mut faces = Vec::new();
-        while let Some(next) = face_corners.next_if(|f| here(f, |f| f.vertex <= vertex)) {
-            faces.push(next?);
+        while let Some(next) = face_corners.next_if(|f| f.vertex <= vertex)? {
+            faces.push(next);
         }
         let numbers = numbers_at(vertex, &tets, &faces, n_vertices + n);
         let doubles = numbers.iter().filter(|&&number| number != vertex);
         let end = doubles.copied().max().map_or(n, |last| last + 1 - n_vertices);
         for _ in n..end {
-            stream.bytes(&vertex.to_le_bytes());
-            stream.end()?;
+            stream.record(&vertex.to_le_bytes())?;
         }
         n = end;
         for (tet, &double) in tets.iter().zip(&numbers).filter(|(_, double)| **double != vertex) {
@@ -94,7 +90,7 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     }
     stream.finish()?;
     let doubles = Doubles { n, changes: dir.join("changes"), vertices: dir.join("doubles") };
-    save(changes.finish()?, &doubles.changes)?;
+    save(changes.finish()?, &doubles.changes, |_| ())?;
     positions(mesh, &originals, &doubles.vertices)?;
     pairs(&doubles, draft, out, n_vertices)?;
     split_faces(mesh, face_changes.finish()?)?;
@@ -102,17 +98,8 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     Ok(())
 }
 
-fn save<R: SortRecord>(records: Sorted<R>, path: &Path) -> Result<()> {
-    let mut stream = scratch(path)?;
-    for record in records {
-        stream.bytes(record?.to_bytes().as_ref());
-        stream.end()?;
-    }
-    stream.finish()
-}
-
 /// Tetrahedra and faces at vertices of sheets, by these. Memory: a bit for each vertex.
-fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<Corner>, Sorted<FaceCorner>)> {
+fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<TetCorner>, Sorted<FaceCorner>)> {
     let mut bits = vec![0u64; mesh.n_vertices().div_ceil(64) as usize];
     mesh.faces().each(|face| {
         if is_sheet(face) {
@@ -145,7 +132,7 @@ fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<Corner>, Sorted<FaceCorner>)> 
     let mut number = 0;
     mesh.tets(|tet| {
         for vertex in tet.nodes.into_iter().filter(|&v| on_sheet(v)) {
-            corners.push(Corner {
+            corners.push(TetCorner {
                 vertex,
                 tet: number,
                 subdomain: tet.subdomain,
@@ -158,12 +145,12 @@ fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<Corner>, Sorted<FaceCorner>)> 
     Ok((corners.finish()?, face_corners.finish()?))
 }
 
-fn is_sheet(face: &Face) -> bool {
+fn is_sheet(face: &BoundaryFace) -> bool {
     face.regions[0] != 0 && face.regions[0] == face.regions[1]
 }
 
 /// What stands for `vertex` in each of its tetrahedra: itself, or doubles that are numbered from `first` on.
-fn numbers_at(vertex: u64, tets: &[Corner], faces: &[FaceCorner], first: u64) -> Vec<u64> {
+fn numbers_at(vertex: u64, tets: &[TetCorner], faces: &[FaceCorner], first: u64) -> Vec<u64> {
     let mut sides: Vec<([u64; 3], usize)> = Vec::with_capacity(3 * tets.len());
     for (i, tet) in tets.iter().enumerate() {
         for face in FACES {
@@ -212,9 +199,9 @@ fn join(classes: &mut [usize], i: usize, j: usize) {
     }
 }
 
-fn face_change(face: &FaceCorner, tets: &[Corner], numbers: &[u64]) -> Option<FaceChange> {
+fn face_change(face: &FaceCorner, tets: &[TetCorner], numbers: &[u64]) -> Option<FaceChange> {
     let front = tets.binary_search_by_key(&face.tet, |tet| tet.tet).ok()?;
-    let has = |tet: &Corner| face.vertices.iter().all(|v| tet.nodes.contains(v));
+    let has = |tet: &TetCorner| face.vertices.iter().all(|v| tet.nodes.contains(v));
     let mut others = tets.iter().enumerate().filter(|(i, tet)| *i != front && has(tet));
     let back = others.next().filter(|_| face.is_sheet);
     Some(FaceChange {
@@ -228,7 +215,7 @@ fn face_change(face: &FaceCorner, tets: &[Corner], numbers: &[u64]) -> Option<Fa
 
 /// Writes the doubles with all that their vertices have.
 fn positions(mesh: &mut Merged, originals: &Path, to: &Path) -> Result<()> {
-    let mut originals = Records::<8>::open(originals, 0)?;
+    let mut originals = Records::open(originals, 0)?;
     let mut next = originals.next()?;
     let mut stream = scratch(to)?;
     mesh.vertices(|number, vertex| {
@@ -240,8 +227,7 @@ fn positions(mesh: &mut Merged, originals: &Path, to: &Path) -> Result<()> {
                 h: vertex.h.into(),
                 point: Payload(vertex.point),
             };
-            stream.bytes(&double.to_bytes());
-            stream.end()?;
+            stream.record(&double)?;
             next = originals.next()?;
         }
         Ok(())
@@ -265,14 +251,13 @@ fn pairs(doubles: &Doubles, draft: &mut Draft, out: &Path, n_vertices: u64) -> R
 
 /// Boundary faces with what stands for their vertices; those of sheets twice, the second time as their backs.
 fn split_faces(mesh: &mut Merged, changes: Sorted<FaceChange>) -> Result<()> {
-    let mut changes = changes.peekable();
+    let mut changes = MergeReader::new(changes);
     let mut number = 0;
     mesh.rewrite_faces(|face, put| {
         let mut back = *face;
         let mut face = *face;
         let mut back_tet = NONE;
-        while let Some(change) = changes.next_if(|c| here(c, |c| c.face == number)) {
-            let change = change?;
+        while let Some(change) = changes.next_if(|c| c.face == number)? {
             for i in 0..3 {
                 if back.vertices[i] == change.vertex && face.vertices[i] == change.vertex {
                     [face.vertices[i], back.vertices[i]] = change.sides;

@@ -50,6 +50,11 @@ impl SealedError {
         }
     }
 
+    /// Damage in the file of a sub-domain, or in `path` as a whole.
+    pub fn content(path: &Path, subdomain: u32, what: impl Into<String>) -> Self {
+        Self::Content { path: path.to_owned(), subdomain, what: what.into() }
+    }
+
     /// Wraps a failed operation on `path`.
     pub fn io(path: &Path, source: std::io::Error) -> Self {
         Self::Storage(StorageError::io(path, source))

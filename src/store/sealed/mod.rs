@@ -9,8 +9,10 @@
 mod batch;
 mod coarse_snapshot;
 mod error;
+mod face_join;
 mod face_pairs;
 mod form;
+mod merge_reader;
 mod shape;
 mod subdomain;
 mod totals;
@@ -19,8 +21,10 @@ mod writer;
 
 pub use coarse_snapshot::{CoarseSnapshot, CoarseWriter};
 pub use error::SealedError;
+pub use face_join::{FaceJoin, FaceJoinSorter, TetFace};
 pub use face_pairs::{FacePairs, Paired, face_of, sorted_face};
 pub use form::Form;
+pub use merge_reader::MergeReader;
 pub use shape::{Shape, quality_bin};
 pub use subdomain::{Chunk, Chunks, Subdomain};
 pub use totals::RegionTotals;

@@ -135,6 +135,11 @@ impl Subdomain {
         self.file.path()
     }
 
+    /// Damage in the file of the sub-domain.
+    pub fn damaged(&self, what: impl Into<String>) -> SealedError {
+        SealedError::content(self.path(), self.id.rank(), what)
+    }
+
     /// Summaries of the chunks of tetrahedra.
     pub fn tet_summaries(&self) -> &[TetSummary] {
         &self.tet_chunks

@@ -90,32 +90,24 @@ impl FoamFile {
 
     /// A triangle of a list of faces; in binary its vertices alone.
     #[inline]
-    pub fn face(&mut self, [a, b, c]: [u32; 3]) -> Result<()> {
+    pub fn face(&mut self, face: [u32; 3]) -> Result<()> {
         if self.ascii {
             self.stream.text("3(");
-            self.stream.integer(a.into(), b' ');
-            self.stream.integer(b.into(), b' ');
-            self.stream.integer(c.into(), b')');
+            self.stream.integers(face.map(u64::from), b' ', b')');
             self.stream.text("\n");
         } else {
-            for v in [a, b, c] {
-                self.stream.bytes(&v.to_le_bytes());
-            }
+            face.iter().for_each(|v| self.stream.bytes(&v.to_le_bytes()));
         }
         self.stream.end()
     }
 
-    pub fn point(&mut self, [x, y, z]: [f64; 3]) -> Result<()> {
+    pub fn point(&mut self, point: [f64; 3]) -> Result<()> {
         if self.ascii {
             self.stream.text("(");
-            self.stream.double(x, b' ');
-            self.stream.double(y, b' ');
-            self.stream.double(z, b')');
+            self.stream.doubles(point, b' ', b')');
             self.stream.text("\n");
         } else {
-            for x in [x, y, z] {
-                self.stream.bytes(&x.to_le_bytes());
-            }
+            self.stream.double_bytes(point);
         }
         self.stream.end()
     }

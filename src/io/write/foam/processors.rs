@@ -16,10 +16,11 @@ use super::polymesh::{
 };
 use super::serial::{WithTwoCells, in_order};
 use tetdb_base::storage::{Sorter, sort_record};
+use tetdb_store::sealed::MergeReader;
 
 sort_record! {
     /// Where a face between two sub-domains is in the whole.
-    struct Address {
+    struct FaceAddress {
         rank: u32,
         other: u32,
         cut: u32,
@@ -30,7 +31,7 @@ sort_record! {
 }
 
 /// What is written for every processor.
-struct Job<'j> {
+struct ProcessorFiles<'j> {
     case: &'j Path,
     names: &'j Names,
     ascii: bool,
@@ -57,7 +58,7 @@ pub(super) fn write(
         |(p, part): (usize, &super::super::merged::Part)| walk.census.n_inner(p, part.n_tets);
     let n_inner = parts.iter().enumerate().map(inner).sum::<u64>() + n_between / 2;
     let mut start = n_inner;
-    let mut job = Job { case, names, ascii, n_inner, patch_starts: BTreeMap::new() };
+    let mut job = ProcessorFiles { case, names, ascii, n_inner, patch_starts: BTreeMap::new() };
     for &label in names.patches.keys() {
         job.patch_starts.insert(label, start);
         start += (walk.census.patches.iter().filter_map(|p| p.get(&label))).sum::<u64>();
@@ -77,12 +78,10 @@ pub(super) fn write(
         }
     }
     mesh.expect_count("inner faces", job.n_inner, next)?;
-    let mut addresses = addresses.finish()?.peekable();
+    let mut addresses = MergeReader::new(addresses.finish()?);
     for (p, part) in parts.iter().enumerate() {
         let is_written = selection.writes_piece(part.rank);
-        let of_part = std::iter::from_fn(|| {
-            addresses.next_if(|a| a.as_ref().map_or(true, |a| a.rank == part.rank))
-        });
+        let of_part = std::iter::from_fn(|| addresses.next_if(|a| a.rank == part.rank).transpose());
         if !is_written {
             of_part.for_each(drop);
             continue;
@@ -90,12 +89,10 @@ pub(super) fn write(
         let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
         let dir = job.dir(part.rank);
         write_labels(draft, (&dir, "faceProcAddressing"), sizes.faces, ascii, |file| {
-            let mut known = Records::<4>::open(&scratch_path(mesh.dir(), part.rank), 0)?;
-            while let Some(label) = known.next()? {
-                file.label(i32::from_le_bytes(label))?;
-            }
+            Records::open(&scratch_path(mesh.dir(), part.rank), 0)?
+                .each(|label| file.label(i32::from_le_bytes(*label)))?;
             of_part.into_iter().try_for_each(|address| {
-                let Address { rank, other, face, .. } = address?;
+                let FaceAddress { rank, other, face, .. } = address?;
                 // The whole has the face as the lower one sees it.
                 file.label(if rank < other { face as i32 } else { -(face as i32) })
             })
@@ -119,7 +116,7 @@ fn sizes(walk: &FaceWalk, p: usize, points: u64, cells: u64) -> Size {
     }
 }
 
-impl Job<'_> {
+impl ProcessorFiles<'_> {
     fn dir(&self, rank: u32) -> std::path::PathBuf {
         mesh_dir(&self.case.join(format!("processor{rank}")))
     }
@@ -132,7 +129,7 @@ impl Job<'_> {
         walk: &FaceWalk,
         (p, faces, size): (usize, PartFaces, Size),
         is_written: bool,
-        (next, addresses): (&mut u64, &mut Sorter<Address>),
+        (next, addresses): (&mut u64, &mut Sorter<FaceAddress>),
     ) -> Result<()> {
         let rank = mesh.parts()[p].rank;
         let dir = self.dir(rank);
@@ -153,13 +150,12 @@ impl Job<'_> {
                     if let Some((zone, is_flipped)) = zone_of(face.zone) {
                         zones.push(zone, files.written() as u32, is_flipped)?;
                     }
-                    known.bytes(&(*next as u32).to_le_bytes());
-                    known.end()?;
+                    known.record(&(*next as u32).to_le_bytes())?;
                     files.inner(face.owner, face.neighbor, face.vertices)
                 }
                 WithTwoCells::Across(upper) => {
                     for (rank, other) in [(rank, upper.other), (upper.other, rank)] {
-                        addresses.push(Address {
+                        addresses.push(FaceAddress {
                             rank,
                             other,
                             cut: upper.cut,
@@ -177,8 +173,7 @@ impl Job<'_> {
             let start = start.expect("patches were counted from the same faces");
             *start += 1;
             if let Some(files) = &mut files {
-                known.bytes(&(*start as u32).to_le_bytes());
-                known.end()?;
+                known.record(&(*start as u32).to_le_bytes())?;
                 files.outer(face.owner, face.vertices)?;
             }
         }

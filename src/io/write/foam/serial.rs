@@ -6,14 +6,15 @@ use super::super::draft::Draft;
 use super::super::error::Result;
 use super::super::merged::Merged;
 use super::super::report::FileCounts;
-use super::faces::{FaceWalk, Inner, Upper, zone_of};
+use super::faces::{FaceWalk, InnerFace, UpperFace, zone_of};
 use super::file::FoamFile;
 use super::polymesh::{FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
+use tetdb_store::sealed::MergeReader;
 
 sort_record! {
     /// A face on the boundary of the whole.
-    struct Placed {
+    struct OuterFaceInOrder {
         patch: u32,
         /// Its place among those of all sub-domains: a cell's faces keep the order that its sub-domain alone gives them.
         place: u32,
@@ -24,23 +25,21 @@ sort_record! {
 
 /// A face with two cells in the whole, at least the first of them in the sub-domain at hand.
 pub(super) enum WithTwoCells {
-    Here(Inner),
-    Across(Upper),
+    Here(InnerFace),
+    Across(UpperFace),
 }
 
 /// Faces of a sub-domain in the order of the whole: by owner, those within it first.
 pub(super) fn in_order(
-    inner: Sorted<Inner>,
-    uppers: Sorted<Upper>,
+    inner: Sorted<InnerFace>,
+    uppers: Sorted<UpperFace>,
     mut each: impl FnMut(WithTwoCells) -> Result<()>,
 ) -> Result<()> {
-    let mut uppers = uppers.peekable();
+    let mut uppers = MergeReader::new(uppers);
     for face in inner {
         let face = face?;
-        while let Some(upper) =
-            uppers.next_if(|u| u.as_ref().map_or(true, |u| u.owner < face.owner))
-        {
-            each(WithTwoCells::Across(upper?))?;
+        while let Some(upper) = uppers.next_if(|upper| upper.owner < face.owner)? {
+            each(WithTwoCells::Across(upper))?;
         }
         each(WithTwoCells::Here(face))?;
     }
@@ -128,7 +127,7 @@ fn write_faces(
         })?;
         for face in faces.outer {
             let face = face?;
-            outer.push(Placed {
+            outer.push(OuterFaceInOrder {
                 patch: face.patch,
                 place: n_outer,
                 owner: first + face.owner,

@@ -70,10 +70,10 @@ pub(super) fn write(
     let mut elements = Elements {
         out,
         tags,
-        order: usize::from(piece.middles.is_some()),
+        order: usize::from(piece.midpoints.is_some()),
         n_faces,
         n_vertices: mesh.n_vertices(),
-        edges: piece.middles.map(Midpoints::tets).transpose()?,
+        edges: piece.midpoints.map(Midpoints::tets).transpose()?,
         entity: None,
     };
     triangles(mesh, &mut elements, piece, entities)?;
@@ -131,18 +131,18 @@ fn lines(
     piece: &Piece,
     (wires, n_before): (&WrittenWires, u64),
 ) -> Result<()> {
-    let mut middles = piece.middles.map(Midpoints::lines).transpose()?;
+    let mut midpoints = piece.midpoints.map(Midpoints::lines).transpose()?;
     let mut edges = (n_before + 1..).zip(&wires.edges);
     for (label, n) in wires.edge_labels() {
-        for word in [1, label + 1, LINES[usize::from(middles.is_some())]] {
+        for word in [1, label + 1, LINES[usize::from(midpoints.is_some())]] {
             out.int(word);
         }
         out.size(n);
         out.end()?;
         for (number, ([a, b], _)) in edges.by_ref().take(n as usize) {
             [number, a + 1, b + 1].into_iter().for_each(|n| out.size(n));
-            if let Some(middles) = &mut middles {
-                out.size(mesh.n_vertices() + middles.next()?[0] + 1);
+            if let Some(midpoints) = &mut midpoints {
+                out.size(mesh.n_vertices() + midpoints.next()?[0] + 1);
             }
             out.end()?;
         }
@@ -191,7 +191,7 @@ fn triangles(
         number += 1;
         Ok(())
     })?;
-    let mut edges = piece.middles.map(Midpoints::faces).transpose()?;
+    let mut edges = piece.midpoints.map(Midpoints::faces).transpose()?;
     for face in sorter.finish()? {
         let face = face?;
         elements.begin(face.entity, TRIANGLES)?;

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
-use super::super::stream::{Records, scratch};
+use super::super::stream::{Records, save};
 use super::out::Out;
-use tetdb_base::storage::{Payload, SortRecord, Sorter, sort_record};
+use tetdb_base::storage::{Payload, Sorter, sort_record};
+use tetdb_store::sealed::MergeReader;
 
 sort_record! {
     /// A tetrahedron as another partition sees it.
@@ -23,8 +24,6 @@ sort_record! {
     }
 }
 
-const BYTES: usize = size_of::<<Ghost as SortRecord>::Bytes>();
-
 /// Those of all partitions, in a scratch file.
 pub(super) struct Ghosts {
     /// Where those of each partition begin.
@@ -35,16 +34,13 @@ pub(super) struct Ghosts {
 impl Ghosts {
     /// Finds them. Errors: damage, the disk.
     pub fn gather(mesh: &mut Merged) -> Result<Self> {
-        let mut sharers = mesh.sharers()?.peekable();
+        let mut sharers = MergeReader::new(mesh.sharers()?);
         let mut sorter = Sorter::new(mesh.dir(), mesh.sorter_bytes());
         for p in 0..mesh.n_parts() {
             // Vertices of this sub-domain by number, ascending, and who else has them; places among all.
             let mut shared: Vec<(u64, u32)> = Vec::new();
             let Opened { mut part, numbers } = mesh.open_part(p)?;
-            while let Some(sharer) =
-                sharers.next_if(|s| s.as_ref().map_or(true, |s| s.part as usize == p))
-            {
-                let sharer = sharer?;
+            while let Some(sharer) = sharers.next_if(|s| s.part as usize == p)? {
                 shared.push((numbers.of_dense(sharer.local), sharer.other));
             }
             shared.sort_unstable();
@@ -88,14 +84,7 @@ impl Ghosts {
         }
         let mut counts = vec![0; mesh.n_parts()];
         let path = mesh.dir().join("ghosts");
-        let mut stream = scratch(&path)?;
-        for ghost in sorter.finish()? {
-            let ghost = ghost?;
-            counts[ghost.to as usize] += 1;
-            stream.bytes(&ghost.to_bytes());
-            stream.end()?;
-        }
-        stream.finish()?;
+        save(sorter.finish()?, &path, |ghost: &Ghost| counts[ghost.to as usize] += 1)?;
         let mut firsts = vec![0];
         for count in counts {
             firsts.push(firsts[firsts.len() - 1] + count);
@@ -104,13 +93,9 @@ impl Ghosts {
     }
 
     /// Those that the partition at place `p` sees, by region and partition. Errors: the disk, those of `each`.
-    pub fn each(&self, p: usize, mut each: impl FnMut(&Ghost) -> Result<()>) -> Result<()> {
-        let mut records = Records::<BYTES>::open(&self.path, self.firsts[p])?;
-        for _ in self.firsts[p]..self.firsts[p + 1] {
-            let Some(record) = records.next()? else { break };
-            each(&Ghost::from_bytes(&record))?;
-        }
-        Ok(())
+    pub fn each(&self, p: usize, each: impl FnMut(&Ghost) -> Result<()>) -> Result<()> {
+        let n = self.firsts[p + 1] - self.firsts[p];
+        Records::open(&self.path, self.firsts[p])?.each_of(n, each)
     }
 
     /// Lists those that the partitions at places `which` see: element, its partition, the one that sees it.

@@ -30,7 +30,7 @@ pub(super) fn write(
     mesh: &mut Merged,
     draft: &mut Draft,
     out: &Path,
-    (selection, middles): (&Selection, Option<&Midpoints>),
+    (selection, midpoints): (&Selection, Option<&Midpoints>),
 ) -> Result<FileCounts> {
     mesh.expect_passes(1, 1);
     let ghosts = match selection.ghosts {
@@ -41,14 +41,14 @@ pub(super) fn write(
     let foreign = ghosts.filter(|_| selection.pieces);
     if !selection.pieces {
         let all: Vec<usize> = (0..mesh.n_parts()).collect();
-        let piece = Piece { which: &all, middles, foreign };
+        let piece = Piece { which: &all, midpoints, foreign };
         return write_file(mesh, draft, out, &piece, (selection.ascii, ghosts));
     }
     let mut counts = FileCounts::default();
     for (p, part) in mesh.parts().into_iter().enumerate() {
         if selection.writes_piece(part.rank) {
             let path = piece_path(out, part.rank);
-            let piece = Piece { which: &[p], middles, foreign };
+            let piece = Piece { which: &[p], midpoints, foreign };
             counts += write_file(mesh, draft, &path, &piece, (selection.ascii, ghosts))?;
         }
     }
@@ -73,7 +73,7 @@ fn write_file(
     let n_tets = entities.n_tets();
     let nodes = nodes::gather(mesh, piece, &entities, path)?;
     let [vertex_bytes, number_bytes] = if ascii { [55, 6] } else { [32, 8] };
-    let numbers = if piece.middles.is_some() { 11 } else { 5 };
+    let numbers = if piece.midpoints.is_some() { 11 } else { 5 };
     let elements_bytes = number_bytes * numbers * (n_tets + entities.n_faces());
     let file = draft.create(path, 1000 + vertex_bytes * nodes.n + elements_bytes)?;
     let mut out = Out::open(&file, ascii)?;

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
-use super::super::midpoints::{MiddlePoints, Midpoints};
-use super::super::stream::{Records, scratch};
+use super::super::midpoints::{MidpointReader, Midpoints};
+use super::super::stream::{Records, save};
 use super::entities::Entities;
 use super::out::Out;
 use super::piece::Piece;
-use tetdb_base::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
+use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
 
 sort_record! {
     /// An entity that a vertex is on, or, behind all of these, where it is.
@@ -31,7 +31,6 @@ sort_record! {
 }
 
 const POSITION: u32 = u32::MAX;
-const NODE_BYTES: usize = size_of::<<Node as SortRecord>::Bytes>();
 
 /// The vertices of a file, sorted, in a scratch file.
 pub(super) struct Nodes {
@@ -77,20 +76,20 @@ pub(super) fn gather(
 ) -> Result<Nodes> {
     let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
     let claims = claims(mesh, piece, entities)?;
-    let mut points = piece.middles.map(Midpoints::points).transpose()?;
+    let mut points = piece.midpoints.map(Midpoints::points).transpose()?;
     let nodes = granted(claims, mesh.n_vertices(), &mut points, Sorter::new(&dir, bytes))?;
     let file = name.file_name().unwrap_or_default().to_string_lossy();
     stored(nodes, entities, dir.join(format!("nodes-{file}")))
 }
 
-/// What faces, tetrahedra and ghosts of the piece say of their vertices and middles, by vertex.
+/// What faces, tetrahedra and ghosts of the piece say of their vertices and midpoints, by vertex.
 fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorted<Claim>> {
     let parts = mesh.parts();
     let n_vertices = mesh.n_vertices();
     let mut claims = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     let mut claim =
         |vertex, entity, point| claims.push(Claim { vertex, entity, point: Payload(point) });
-    let mut edges = piece.middles.map(Midpoints::faces).transpose()?;
+    let mut edges = piece.midpoints.map(Midpoints::faces).transpose()?;
     let mut number = 0;
     mesh.faces().each(|face| {
         if let Some(entity) = entities.surface(face) {
@@ -106,15 +105,15 @@ fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorte
         number += 1;
         Ok(())
     })?;
-    let mut edges = piece.middles.map(Midpoints::tets).transpose()?;
+    let mut edges = piece.midpoints.map(Midpoints::tets).transpose()?;
     for &p in piece.which {
         let Opened { mut part, numbers } = mesh.open_part(p)?;
         let rank = parts[p].rank;
         let only = entities.only_volume(rank);
         // Inside, all tetrahedra around a vertex are of one region, so that the first one tells it.
         let mut vertices = Seen::new(parts[p].first_vertex, parts[p].n_vertices);
-        let of_edges = piece.middles.map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
-        let mut middles = Seen::new(n_vertices + of_edges.0, of_edges.1);
+        let of_edges = piece.midpoints.map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
+        let mut midpoints = Seen::new(n_vertices + of_edges.0, of_edges.1);
         let needs_tets = only.is_none() || edges.is_some();
         for tet in part.tets().take_while(|_| needs_tets) {
             let (id, tet) = tet?;
@@ -129,7 +128,7 @@ fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorte
             }
             if let Some(edges) = &mut edges {
                 for v in edges.of(number)?.map(|edge| n_vertices + edge) {
-                    if middles.is_new(v) {
+                    if midpoints.is_new(v) {
                         claim(v, entity, [0.0; 3])?;
                     }
                 }
@@ -167,7 +166,7 @@ fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorte
 fn granted(
     claims: Sorted<Claim>,
     n_vertices: u64,
-    points: &mut Option<MiddlePoints>,
+    points: &mut Option<MidpointReader>,
     mut sorter: Sorter<Node>,
 ) -> Result<Sorted<Node>> {
     let mut last = None;
@@ -182,7 +181,7 @@ fn granted(
             }
             _ => {
                 last = Some((claim.vertex, claim.entity));
-                // Nobody claims the positions of middles: they stand in the order of their numbers.
+                // Nobody claims the positions of midpoints: they stand in the order of their numbers.
                 let edge = claim.vertex.checked_sub(n_vertices);
                 if let (Some(points), Some(edge)) = (&mut *points, edge) {
                     sorter.push(Node {
@@ -201,17 +200,13 @@ fn granted(
 fn stored(sorted: Sorted<Node>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
     let mut nodes =
         Nodes { n: 0, counts: vec![0; entities.tags().len()], span: [u64::MAX, 0], path };
-    let mut stream = scratch(&nodes.path)?;
-    for node in sorted {
-        let node = node?;
-        nodes.n += 1;
-        nodes.counts[node.entity as usize] += 1;
-        let [least, greatest] = nodes.span;
-        nodes.span = [least.min(node.vertex + 1), greatest.max(node.vertex + 1)];
-        stream.bytes(&node.to_bytes());
-        stream.end()?;
-    }
-    stream.finish()?;
+    let Nodes { n, counts, span: [least, greatest], path } = &mut nodes;
+    save(sorted, path, |node: &Node| {
+        *n += 1;
+        counts[node.entity as usize] += 1;
+        *least = (*least).min(node.vertex + 1);
+        *greatest = (*greatest).max(node.vertex + 1);
+    })?;
     Ok(nodes)
 }
 
@@ -233,24 +228,15 @@ impl Nodes {
             }
             out.size(n);
             out.end()?;
-            self.each(first, n, |node| {
+            Records::open(&self.path, first)?.each_of(n, |node: &Node| {
                 out.size(node.vertex + 1);
                 out.end()
             })?;
-            self.each(first, n, |node| {
+            Records::open(&self.path, first)?.each_of(n, |node: &Node| {
                 node.point.0.into_iter().for_each(|x| out.double(x));
                 out.end()
             })?;
             first += n;
-        }
-        Ok(())
-    }
-
-    fn each(&self, first: u64, n: u64, mut each: impl FnMut(Node) -> Result<()>) -> Result<()> {
-        let mut records = Records::<NODE_BYTES>::open(&self.path, first)?;
-        for _ in 0..n {
-            let Some(record) = records.next()? else { break };
-            each(Node::from_bytes(&record))?;
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use super::ghosts::{Ghost, Ghosts};
 pub(super) struct Piece<'a> {
     /// Places of its partitions among all.
     pub which: &'a [usize],
-    pub middles: Option<&'a Midpoints>,
+    pub midpoints: Option<&'a Midpoints>,
     /// In files of one partition, tetrahedra of others that it sees.
     pub foreign: Option<&'a Ghosts>,
 }

@@ -44,8 +44,8 @@ pub(super) fn write(
         let mut opened = mesh.open_part(p)?;
         let stem = out.file_stem().unwrap_or_default().to_string_lossy();
         let path = out.with_file_name(format!("{stem}.{:06}", row.rank));
-        let fin_first = mesh.fin_first();
-        let written = write_part((&mut opened, fin_first), draft, &path, &sets, |stream| {
+        let support_first = mesh.support_first();
+        let written = write_part((&mut opened, support_first), draft, &path, &sets, |stream| {
             shared.write(p as u32, stream)
         })?;
         mesh.advance((written.vertices + written.tets) as usize);
@@ -78,7 +78,7 @@ fn write_serial(
 
 /// A sub-domain; `end` writes what follows the mesh.
 fn write_part(
-    (opened, fin_first): (&mut Opened, u64),
+    (opened, support_first): (&mut Opened, u64),
     draft: &mut Draft,
     out: &Path,
     sets: &[String; 2],
@@ -88,7 +88,7 @@ fn write_part(
     let counts = FileCounts {
         vertices: part.row().vertices,
         tets: part.row().tets,
-        triangles: each_facet(part, fin_first, |_| Ok(()))?,
+        triangles: each_facet(part, support_first, |_| Ok(()))?,
     };
     let mut stream = begin(draft, out, counts)?;
     for tet in part.tets() {
@@ -97,7 +97,7 @@ fn write_part(
         element(&mut stream, tet.region.into(), TETRAHEDRON, &nodes)?;
     }
     boundary(&mut stream, counts.triangles, sets);
-    each_facet(part, fin_first, |facet| {
+    each_facet(part, support_first, |facet| {
         let nodes = outward(facet.vertices.map(u64::from), facet.regions);
         element(&mut stream, u64::from(facet.label) + 1, TRIANGLE, &nodes)
     })?;
@@ -115,14 +115,14 @@ fn write_part(
 /// The input triangles that are this sub-domain's to list: those whose filled side, or front where both are filled, is here. Returns how many.
 fn each_facet(
     part: &mut Subdomain,
-    fin_first: u64,
+    support_first: u64,
     mut each: impl FnMut(&SealedFacet) -> Result<()>,
 ) -> Result<u64> {
     let mut n = 0;
     for facet in part.facets() {
         let facet = facet?;
         let is_here = facet.tets[usize::from(facet.regions[0] == 0)] != NO_TET;
-        if is_here && facet.triangle < fin_first {
+        if is_here && facet.triangle < support_first {
             each(&facet)?;
             n += 1;
         }

@@ -5,7 +5,6 @@
 //! vertex.
 
 use std::collections::BTreeMap;
-use std::iter::Peekable;
 
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
@@ -13,6 +12,7 @@ use super::super::stream::Stream;
 use super::lines::{TRIANGLE, list};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_schema::record::NO_TET;
+use tetdb_store::sealed::MergeReader;
 
 sort_record! {
     /// A vertex, an edge or a face on the boundary of a sub-domain.
@@ -27,7 +27,7 @@ sort_record! {
 
 sort_record! {
     /// One that is shared, as one of those that have it lists it.
-    struct Member {
+    struct SharedMember {
         part: u32,
         group: u32,
         /// Vertices less one.
@@ -71,7 +71,7 @@ fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
 
 /// All that is shared.
 pub(super) struct Shared {
-    members: Peekable<Sorted<Member>>,
+    members: MergeReader<SharedMember>,
     /// Places of the sub-domains of each group.
     groups: Vec<Vec<u32>>,
     /// Vertices, edges and faces of each sub-domain's groups.
@@ -81,39 +81,30 @@ pub(super) struct Shared {
 impl Shared {
     /// Finds it. Errors: damage, the disk.
     pub fn gather(mesh: &mut Merged) -> Result<Self> {
-        let mut entities = entities(mesh)?.peekable();
+        let (mut entities, mut all) = (MergeReader::new(entities(mesh)?), Vec::new());
         let mut members = Sorter::new(mesh.dir(), mesh.sorter_bytes());
         let mut group_of = BTreeMap::new();
         let mut counts = BTreeMap::<_, [u64; 3]>::new();
-        while let Some(first) = entities.next() {
-            let first = first?;
-            let mut all = vec![first];
-            while let Some(next) =
-                entities.next_if(|e| e.as_ref().map_or(true, |e| e.key == first.key))
-            {
-                let next = next?;
-                if all.last() != Some(&next) {
-                    all.push(next);
-                }
-            }
+        while entities.next_group(&mut all, |a, b| a.key == b.key)? {
+            all.dedup();
             if all.len() == 1 {
                 continue;
             }
             let ranks: Vec<u32> = all.iter().map(|e| e.part).collect();
             let n = group_of.len() as u32;
             let group = *group_of.entry(ranks).or_insert(n);
-            let [a, b, c] = first.key;
+            let [a, b, c] = all[0].key;
             let dimension = u32::from(a != b) + u32::from(b != c);
-            for Entity { key, part, locals } in all {
+            for &Entity { key, part, locals } in &all {
                 counts.entry((part, group)).or_default()[dimension as usize] += 1;
-                members.push(Member { part, group, dimension, key, locals })?;
+                members.push(SharedMember { part, group, dimension, key, locals })?;
             }
         }
         let mut groups = vec![Vec::new(); group_of.len()];
         for (ranks, group) in group_of {
             groups[group as usize] = ranks;
         }
-        let members = members.finish()?.peekable();
+        let members = MergeReader::new(members.finish()?);
         Ok(Self { members, groups, counts })
     }
 
@@ -139,11 +130,8 @@ impl Shared {
             for (dimension, what) in (0..).zip(["vertices", "edges", "faces"]) {
                 stream.text(&format!("\nshared_{what} {}\n", counts[dimension as usize]));
                 let here = (p, group, dimension);
-                let order = |m: &Member| (m.part, m.group, m.dimension);
-                while let Some(member) =
-                    self.members.next_if(|m| m.as_ref().map_or(true, |m| order(m) <= here))
-                {
-                    let member = member?;
+                let order = |m: &SharedMember| (m.part, m.group, m.dimension);
+                while let Some(member) = self.members.next_if(|m| order(m) <= here)? {
                     if order(&member) < here {
                         continue; // of a sub-domain that is not written
                     }

@@ -1,4 +1,4 @@
-//! Defective triangles as a VTK file, to look at them.
+//! Defective triangles of a surface as a VTK file, for viewers.
 //!
 //! Each triangle has vertices of its own. Cell data: `defect`, the number of the first kind in [`KINDS`] it has;
 //! `defects`, in how many it takes part; `input_id`; `label`. The words of the numbers stand in the field array
@@ -7,18 +7,20 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::draft::Draft;
-use super::error::{Result, WriteError};
-use super::vtu_layout::{Array, Container, Group, Index, Layout};
+use super::grid::{Container, Grid};
+use crate::write::columns::column;
+use crate::write::draft::Draft;
+use crate::write::error::{Result, WriteError};
 use tetdb_base::surface::{Defect, Surface};
 
-/// VTK's number of a triangle.
-const TRIANGLE: u8 = 5;
 /// Words of defects by their number in the file; no triangle has number 0.
 const KINDS: [&str; 5] =
     ["none", "degenerate-triangle", "duplicate-triangle", "open-surface", "self-intersection"];
 
-/// Writes the triangles that `defects` are about to the `.vtu` file `out` and returns how many there are.
+/// A defective triangle: number of its first kind of defect, number of its defects, its place in the input, its label.
+type DefectRow = (i32, i32, u32, u32);
+
+/// Writes the triangles that have `defects` to the `.vtu` file `out` and returns their number.
 ///
 /// Errors: [`WriteError`]; `out` is not touched then.
 pub fn defects(surface: &Surface, defects: &[Defect], out: &Path) -> Result<u64> {
@@ -28,41 +30,26 @@ pub fn defects(surface: &Surface, defects: &[Defect], out: &Path) -> Result<u64>
     }
     let bad = numbered(defects);
     let n = bad.len() as u64;
-    let index = Index::new(3 * n, 3 * n);
-    let arrays = vec![
-        Array::new(Group::CellData, "defect", "Int32"),
-        Array::new(Group::CellData, "defects", "Int32"),
-        Array::new(Group::CellData, "input_id", "Int64"),
-        Array::new(Group::CellData, "label", "UInt32"),
-        Array::new(Group::Points, "Points", "Float64").vectors(),
-        Array::new(Group::Cells, "connectivity", index.kind()),
-        Array::new(Group::Cells, "offsets", index.kind()),
-        Array::new(Group::Cells, "types", "UInt8"),
+    let columns = vec![
+        column("defect", |row: &DefectRow| row.0),
+        column("defects", |row: &DefectRow| row.1),
+        column("input_id", |row: &DefectRow| i64::from(row.2)),
+        column("label", |row: &DefectRow| row.3),
     ];
     let texts: Vec<u8> = KINDS.iter().flat_map(|word| word.bytes().chain([0])).collect();
     let texts = ("defect_names", texts.as_slice());
-    let layout = Layout::new(&Container::Xml, &arrays, [3 * n, n, 3], texts);
+    let grid = Grid::new(&Container::Xml, [3 * n, n, 3], texts, vec![], columns);
     let mut draft = Draft::new(out)?;
-    let path = draft.create(out, layout.file_bytes())?;
-    let [mut kinds, mut counts, mut ids, mut labels, mut points, mut nodes, mut ends, mut types] =
-        layout.open(&path)?;
+    let path = draft.create(out, grid.file_bytes())?;
+    let mut file = grid.open(&path)?;
     for (place, (&t, &(kind, count))) in (0u64..).zip(&bad) {
-        kinds.put(&kind.to_le_bytes())?;
-        counts.put(&count.to_le_bytes())?;
-        ids.put(&i64::from(t).to_le_bytes())?;
-        labels.put(&surface.labels[t as usize].to_le_bytes())?;
-        for x in surface.corners(t).iter().flat_map(|p| p.to_array()) {
-            points.put(&x.to_le_bytes())?;
+        for position in surface.corners(t) {
+            file.point(&(), position.to_array())?;
         }
-        for corner in 3 * place..3 * place + 3 {
-            index.put(&mut nodes, corner)?;
-        }
-        index.put(&mut ends, 3 * place + 3)?;
-        types.put(&[TRIANGLE])?;
+        let row = (kind, count, t, surface.labels[t as usize]);
+        file.cell(&row, (3 * place..3 * place + 3).map(Ok))?;
     }
-    for strip in [kinds, counts, ids, labels, points, nodes, ends, types] {
-        strip.finish()?;
-    }
+    file.finish()?;
     draft.publish()?;
     Ok(n)
 }
