@@ -3,17 +3,17 @@
 use std::collections::HashMap;
 use std::io::BufRead;
 
+use super::Result;
 use super::feed::Feed;
-use super::{ReadError, Result};
 
-/// Numbers of a section, in text or in binary of either byte order.
-pub(super) struct Numbers<R> {
+/// GmshNumbers of a section, in text or in binary of either byte order.
+pub(super) struct GmshNumbers<R> {
     pub feed: Feed<R>,
     pub binary: bool,
     pub big: bool,
 }
 
-impl<R: BufRead> Numbers<R> {
+impl<R: BufRead> GmshNumbers<R> {
     /// An `int` of the format.
     pub fn int(&mut self) -> Result<i64> {
         if !self.binary {
@@ -183,9 +183,6 @@ pub(super) fn need_element_type<R: BufRead>(kind: i64, feed: &Feed<R>) -> Result
             Err(feed.unsupported(format!("a curved face (element type {kind})")))
         }
         Some(found) => Ok(found),
-        None => Err(ReadError::Unsupported {
-            place: feed.place(),
-            what: format!("element type {kind}"),
-        }),
+        None => Err(feed.unsupported(format!("element type {kind}"))),
     }
 }

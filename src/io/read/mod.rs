@@ -10,7 +10,7 @@ mod gmsh;
 mod gmsh_numbers;
 mod lengths;
 mod medit;
-mod meditb;
+mod medit_numbers;
 mod obj;
 mod off;
 mod open;
@@ -31,7 +31,7 @@ mod tests;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
-pub use error::{FilePlace, ReadError, Spot};
+pub use error::{FilePlace, ReadError, ReadFault, Spot};
 use feed::{Feed, Result};
 pub use lengths::read_lengths;
 pub use open::is_stream;
@@ -153,11 +153,8 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
     let extent = (bounds.high - bounds.low).max_element();
     // Points and nothing else are a matter of validation.
     if extent > 0.0 && extent < EXTENT_MIN {
-        let file = paths.first().map(|p| p.display().to_string());
-        return Err(ReadError::Surface {
-            place: FilePlace { file: file.unwrap_or_default(), spot: Spot::Totals },
-            source: SurfaceError::TooSmall { extent },
-        });
+        let place = FilePlace::of_file(paths.first().map_or(Path::new(""), |path| path));
+        return Err(place.refuse(ReadFault::Surface(SurfaceError::TooSmall { extent })));
     }
     Ok(surface)
 }
@@ -178,6 +175,10 @@ pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> 
     Ok(builder.finish())
 }
 
+const UNKNOWN_FORMAT: ReadFault = ReadFault::UnknownFormat(
+    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds, with .gz or .zst behind it where it is packed",
+);
+
 fn unique(stem: &str, taken: &[String]) -> String {
     let mut name = stem.to_owned();
     let mut n = 1;
@@ -189,8 +190,9 @@ fn unique(stem: &str, taken: &[String]) -> String {
 }
 
 fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
+    let place = FilePlace::of_file(path);
     if let Some(kind) = solid_model(path, b"") {
-        return Err(ReadError::SolidModel { place: FilePlace::of_file(path), kind });
+        return Err(place.refuse(ReadFault::SolidModel(kind)));
     }
     let mut feed = open(path, limit)?;
     let format = match Format::of_extension(path) {
@@ -199,16 +201,7 @@ fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
             let (length, head) = (feed.len, feed.head()?);
             let found = Format::of_head(head, length);
             let kind = solid_model(path, head);
-            found.ok_or_else(|| {
-                let place = FilePlace::of_file(path);
-                match kind {
-                    Some(kind) => ReadError::SolidModel { place, kind },
-                    None => ReadError::UnknownFormat {
-                        place,
-                        help: "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds, with .gz or .zst behind it where it is packed",
-                    },
-                }
-            })?
+            found.ok_or_else(|| place.refuse(kind.map_or(UNKNOWN_FORMAT, ReadFault::SolidModel)))?
         }
     };
     target.builder.begin_file(feed.file());
@@ -225,17 +218,15 @@ fn read_feed<R: BufRead>(
     target: &mut SurfaceSink,
 ) -> Result<()> {
     if feed.len == 0 {
-        return Err(ReadError::Empty {
-            place: FilePlace { file: feed.file().to_owned(), spot: Spot::Totals },
-        });
+        return Err(feed.empty());
     }
     match format {
         Format::Stl => stl::read(feed, target),
         Format::Off => off::read(feed, target),
         Format::Obj => obj::read(feed, target),
         Format::Ply => ply::read(feed, target),
-        Format::Medit => medit::read(feed, target),
-        Format::MeditBinary => meditb::read(feed, target),
+        Format::Medit => medit::read(feed, false, target),
+        Format::MeditBinary => medit::read(feed, true, target),
         Format::Gmsh => gmsh::read(feed, target),
         Format::TetgenSmesh => tetgen::read(feed, tetgen::Kind::Smesh, nodes, limit, target),
         Format::TetgenPoly => tetgen::read(feed, tetgen::Kind::Poly, nodes, limit, target),

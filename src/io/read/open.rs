@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
-use super::error::{FilePlace, ReadError};
+use super::error::{FilePlace, ReadError, ReadFault};
 use super::feed::{self, Feed, Result};
 
 /// Bytes of the read buffer of one file.
@@ -22,7 +22,7 @@ enum Packing {
     Zstd,
 }
 
-/// The packing that the end of a name tells, and the name without it.
+/// The packing by the ending of a name, and the name without the ending.
 fn packing(path: &Path) -> Option<(Packing, PathBuf)> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     let packing = match extension.as_str() {
@@ -46,7 +46,7 @@ pub(super) fn stem(path: &Path) -> String {
     if name.is_empty() { "surface".to_owned() } else { name }
 }
 
-/// Whether what stands here can be read but once: a pipe, or `-`, the standard input.
+/// Returns whether a path can be read only once: a pipe, or `-`, the standard input.
 pub fn is_stream(path: &Path) -> bool {
     path == Path::new("-") || std::fs::metadata(path).is_ok_and(|meta| is_pipe(&meta))
 }
@@ -62,7 +62,7 @@ fn is_pipe(_: &std::fs::Metadata) -> bool {
     false
 }
 
-/// Opens a regular file, plain or packed, or a pipe. Of what is packed or piped at most `limit` bytes are held.
+/// Opens a regular file, plain or packed, or a pipe. Packed and piped files are held unpacked, in at most `limit` bytes.
 pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
     let name = path.to_string_lossy();
     let unpack: Reader = match packing(path) {
@@ -76,11 +76,11 @@ pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
                 d.window_log_max(WINDOW_LOG_MAX)?;
                 Ok(d)
             });
-            Box::new(BufReader::new(decoder.map_err(|e| unreadable(path, e.to_string()))?))
+            Box::new(BufReader::new(decoder.map_err(|e| unreadable(path, e))?))
         }
         None if path == Path::new("-") => Box::new(BufReader::new(std::io::stdin())),
         None if is_stream(path) => {
-            let file = File::open(path).map_err(|e| unreadable(path, e.to_string()))?;
+            let file = File::open(path).map_err(|e| unreadable(path, e))?;
             Box::new(BufReader::new(file))
         }
         None => {
@@ -97,32 +97,28 @@ pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
 fn within(from: Reader, path: &Path, limit: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let read = from.take(limit.saturating_add(1)).read_to_end(&mut bytes);
-    read.map_err(|e| unreadable(path, e.to_string()))?;
+    read.map_err(|e| unreadable(path, e))?;
     if bytes.len() as u64 > limit {
-        return Err(ReadError::TooLarge {
-            place: FilePlace::of_file(path),
-            what: "the unpacked file",
-            needed: bytes.len() as u64,
-            limit,
-        });
+        let (what, needed) = ("the unpacked file", bytes.len() as u64);
+        let fault = ReadFault::TooLarge { what, needed, limit };
+        return Err(FilePlace::of_file(path).refuse(fault));
     }
     Ok(bytes)
 }
 
-/// Opens a regular file; tells its length.
+/// Opens a regular file; returns its length too.
 ///
 /// # Errors
-/// A pipe or a device, before it is opened: that could take for ever, and so could reading it.
+/// A pipe or a device, before it is opened: opening or reading one could take for ever.
 pub(super) fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
-    let meta = std::fs::metadata(path).map_err(|e| unreadable(path, e.to_string()))?;
+    let meta = std::fs::metadata(path).map_err(|e| unreadable(path, e))?;
     if !meta.is_file() {
-        let reason = "it is not a regular file".to_owned();
-        return Err(unreadable(path, reason));
+        return Err(unreadable(path, "it is not a regular file"));
     }
-    let file = File::open(path).map_err(|e| unreadable(path, e.to_string()))?;
+    let file = File::open(path).map_err(|e| unreadable(path, e))?;
     Ok((BufReader::with_capacity(BUFFER_BYTES, file), meta.len()))
 }
 
-fn unreadable(path: &Path, reason: String) -> ReadError {
-    ReadError::Unreadable { place: FilePlace::of_file(path), reason }
+fn unreadable(path: &Path, reason: impl ToString) -> ReadError {
+    FilePlace::of_file(path).refuse(ReadFault::Unreadable(reason.to_string()))
 }

@@ -3,7 +3,7 @@
 use std::io::BufRead;
 
 use super::feed::{Feed, parse};
-use super::{ReadError, Result, SurfaceSink};
+use super::{Result, Spot, SurfaceSink};
 use tetdb_base::geom::Point;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -73,7 +73,7 @@ struct Header {
 
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let header = read_header(&mut feed)?;
-    feed.binary = header.encoding != Encoding::Text;
+    feed.at.is_binary = header.encoding != Encoding::Text;
     let n_vertices = header.elements.iter().find(|e| e.name == "vertex").map_or(0, |e| e.n);
     for element in &header.elements {
         let n = check_count(&feed, &header, element)?;
@@ -104,13 +104,8 @@ fn check_count<R: BufRead>(feed: &Feed<R>, header: &Header, element: &Element) -
         "face" => "faces",
         _ => "elements",
     };
-    feed.check_count(name, element.n, bytes.max(1)).map_err(|e| match e {
-        ReadError::CountMismatch { mut place, what, declared, found } => {
-            place.spot = super::Spot::Line(element.line);
-            ReadError::CountMismatch { place, what, declared, found }
-        }
-        e => e,
-    })
+    let counted = feed.check_count(name, element.n, bytes.max(1));
+    counted.map_err(|e| e.at_spot(Spot::Line(element.line)))
 }
 
 fn read_header<R: BufRead>(feed: &mut Feed<R>) -> Result<Header> {
@@ -120,18 +115,14 @@ fn read_header<R: BufRead>(feed: &mut Feed<R>) -> Result<Header> {
     let mut first = true;
     loop {
         bytes.clear();
-        let line = feed.line;
+        let line = feed.at.line;
         if !feed.read_line(&mut bytes)? {
             return Err(feed.truncated("`end_header`"));
         }
         let text = String::from_utf8_lossy(&bytes).into_owned();
         let words: Vec<&str> = text.split_whitespace().collect();
         let wrong = |feed: &Feed<R>, expected: &str| {
-            let mut error = feed.unexpected(expected, &bytes);
-            if let ReadError::Unexpected { place, .. } = &mut error {
-                place.spot = super::Spot::Line(line);
-            }
-            Err(error)
+            Err(feed.unexpected(expected, &bytes).at_spot(Spot::Line(line)))
         };
         match words.as_slice() {
             ["ply"] if first => {}
@@ -257,9 +248,7 @@ fn read_vertices<R: BufRead>(
         return Err(feed.unexpected("vertex properties x, y and z", b"others"));
     }
     for i in 0..n {
-        if encoding == Encoding::Text && feed.at_end()? {
-            return Err(feed.too_few("vertices", n, i));
-        }
+        feed.need_record("vertices", n, i)?;
         let mut p = [0.0; 3];
         for (property, axis) in element.properties.iter().zip(&axes) {
             match axis {
@@ -293,9 +282,7 @@ fn read_faces<R: BufRead>(
     let label = target.label("");
     let mut corners = Vec::new();
     for i in 0..n {
-        if encoding == Encoding::Text && feed.at_end()? {
-            return Err(feed.too_few("faces", n, i));
-        }
+        feed.need_record("faces", n, i)?;
         for property in &element.properties {
             let Some(count) = property.count.filter(|_| is_corners(property)) else {
                 skip(feed, encoding, property)?;

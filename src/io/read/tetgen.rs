@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::feed::{Feed, name, parse};
 use super::wire_sink::WireSink;
-use super::{ReadError, Result, SurfaceSink, open};
+use super::{ReadFault, Result, SurfaceSink, open};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceError, VolumePoints};
 
@@ -45,9 +45,7 @@ pub(super) fn read<R: BufRead>(
     feed.skip_line()?;
     let mut n_split = 0;
     for i in 0..n_facets {
-        if feed.at_end()? {
-            return Err(feed.too_few("facets", n_facets, i));
-        }
+        feed.need_record("facets", n_facets, i)?;
         match kind {
             Kind::Smesh => {
                 let corners = read_polygon(&mut feed, numbering)?;
@@ -78,9 +76,7 @@ fn read_volume_points<R: BufRead>(
     let n = u64::try_from(feed.integer("the number of points in the volume")?).unwrap_or(0);
     feed.skip_line()?;
     for i in 0..n {
-        if feed.at_end()? {
-            return Err(feed.too_few("points in the volume", n, i));
-        }
+        feed.need_record("points in the volume", n, i)?;
         let _: i64 = feed.integer("the number of a point in the volume")?;
         let point = feed.point()?;
         match points {
@@ -159,9 +155,7 @@ pub(super) fn read_segments<R: BufRead>(
     let n_facets = feed.count("facets", 4)?;
     feed.skip_line()?;
     for i in 0..n_facets {
-        if feed.at_end()? {
-            return Err(feed.too_few("facets", n_facets, i));
-        }
+        feed.need_record("facets", n_facets, i)?;
         let n_polygons = feed.count("polygons", 4)?;
         let rest = rest_of_line(&mut feed)?;
         let label = marker_name(rest.get(1).copied().unwrap_or(0));
@@ -288,9 +282,7 @@ fn read_facet<R: BufRead>(
     let (n_holes, marker) = (rest.first().copied().unwrap_or(0), rest.get(1).copied().unwrap_or(0));
     let n_holes = feed.check_count("holes of a facet", n_holes, 6)?;
     for i in 0..n_polygons {
-        if feed.at_end()? {
-            return Err(feed.too_few("polygons", n_polygons, i));
-        }
+        feed.need_record("polygons", n_polygons, i)?;
         let corners = read_polygon(feed, numbering)?;
         rest_of_line(feed)?;
         add(feed, &corners, marker, target)?;
@@ -302,12 +294,8 @@ fn read_facet<R: BufRead>(
         feed.skip_line()?;
     }
     if n_polygons == 0 {
-        let place = feed.place();
-        return Err(ReadError::Unexpected {
-            place,
-            expected: "at least one polygon".to_owned(),
-            found: "none".to_owned(),
-        });
+        let (expected, found) = ("at least one polygon".to_owned(), "none".to_owned());
+        return Err(feed.refuse(ReadFault::Unexpected { expected, found }));
     }
     Ok(n_polygons > 1 || n_holes > 0)
 }

@@ -175,13 +175,7 @@ impl<R: BufRead> Vtk<R> {
     }
 
     fn too_many(&self, size: u64) -> ReadError {
-        let found = "the cells need others";
-        ReadError::CountMismatch {
-            place: self.feed.place(),
-            what: "numbers of cells",
-            declared: size.to_string(),
-            found: found.to_owned(),
-        }
+        self.feed.miscounted("numbers of cells", size, "the cells need others")
     }
 
     /// Up to the empty line that ends it.

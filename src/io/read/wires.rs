@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::error::{FilePlace, ReadError, Spot};
+use super::error::{FilePlace, ReadFault};
 use super::feed::{Feed, Result, name, parse};
 use super::open::{Reader, open, stem, unpacked_name};
 use super::wire_sink::{WireKind, WireSink};
@@ -13,10 +13,9 @@ use tetdb_base::surface::WireSet;
 /// Reads the edges or the points of a file, labels after its groups or markers, else after the file. `cap`: bytes of memory it may take.
 ///
 /// # Errors
-/// The first [`ReadError`] with its place; a file without any is one.
+/// The first [`ReadError`](super::ReadError) with its place; a file without any is one.
 pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
     let mut feed = open(path, cap / 4)?;
-    let file = feed.file().to_owned();
     let mut sink = WireSink::called(stem(path), cap / 4);
     let named = unpacked_name(path);
     let extension = named.extension().unwrap_or_default().to_string_lossy();
@@ -30,28 +29,21 @@ pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
         ("node", WireKind::Points) => tetgen::read_nodes(&mut feed, &mut sink)?,
         ("csv" | "txt" | "xyz", WireKind::Points) => read_table(&mut feed, &mut sink)?,
         _ => {
-            return Err(ReadError::UnknownFormat {
-                place: FilePlace::of_file(path),
-                help: "edges are read from .obj, .vtk and .poly, points from .csv, .node, .obj and .vtk",
-            });
+            let help =
+                "edges are read from .obj, .vtk and .poly, points from .csv, .node, .obj and .vtk";
+            return Err(FilePlace::of_file(path).refuse(ReadFault::UnknownFormat(help)));
         }
     }
     let set = sink.set;
-    let is_empty = match kind {
-        WireKind::Edges => set.edges.is_empty(),
-        WireKind::Points => set.marks.is_empty(),
+    let (is_empty, expected) = match kind {
+        WireKind::Edges => (set.edges.is_empty(), "edges"),
+        WireKind::Points => (set.marks.is_empty(), "points"),
     };
-    match is_empty {
-        true => Err(ReadError::Unexpected {
-            place: FilePlace { file, spot: Spot::Totals },
-            expected: match kind {
-                WireKind::Edges => "edges".to_owned(),
-                WireKind::Points => "points".to_owned(),
-            },
-            found: "none".to_owned(),
-        }),
-        false => Ok(set),
+    if !is_empty {
+        return Ok(set);
     }
+    let (expected, found) = (expected.to_owned(), "none".to_owned());
+    Err(FilePlace::of_file(path).refuse(ReadFault::Unexpected { expected, found }))
 }
 
 /// Lines of three numbers, and a name behind them; between them commas, semicolons or blanks. A first line of words is a heading.

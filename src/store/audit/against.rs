@@ -3,7 +3,7 @@
 use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::{NO_TET, SealedFacet};
 
-use super::{Finding, Offender, Report};
+use super::{Finding, Report};
 use crate::sealed::Corner;
 use tetdb_base::surface::Surface;
 
@@ -52,11 +52,8 @@ pub(super) fn input_vertex(corner: &Corner) -> Option<u32> {
 /// Every vertex of a facet is the input's, whether the input is at hand or not.
 pub(super) fn check_owners(subdomain: u32, corners: &[Corner; 3], report: &mut Report) {
     if input_vertices(corners).contains(&None) {
-        let finding = Finding::AddedVertex;
-        report.find(finding, || {
-            let what = "a facet has a vertex that is not the input's";
-            Offender::new(finding, Some(subdomain), what).with_corners(corners)
-        });
+        let what = "a facet has a vertex that is not the input's";
+        report.find(Finding::AddedVertex, subdomain, what).with_corners(corners);
     }
 }
 
@@ -102,13 +99,9 @@ impl<'a> Input<'a> {
         corners: &[Corner; 3],
         report: &mut Report,
     ) {
-        let wrong = self.difference(facet, corners);
-        if let Some(what) = wrong {
-            let finding = Finding::NotAnInputTriangle;
-            report.find(finding, || {
-                let what = format!("the facet of input triangle {} {what}", facet.triangle);
-                Offender::new(finding, Some(subdomain), what).with_corners(corners)
-            });
+        if let Some(what) = self.difference(facet, corners) {
+            let what = format_args!("the facet of input triangle {} {what}", facet.triangle);
+            report.find(Finding::NotAnInputTriangle, subdomain, what).with_corners(corners);
         }
     }
 
@@ -178,11 +171,6 @@ impl<'a> Input<'a> {
     }
 
     fn report(&self, finding: Finding, number: usize, what: String, report: &mut Report) {
-        report.find(finding, || {
-            let mut offender = Offender::new(finding, None, what);
-            let points = self.surface.corners(number as u32);
-            offender.points = points.map(|p| p.to_array()).to_vec();
-            offender
-        });
+        report.find(finding, None, what).with_points(self.surface.corners(number as u32));
     }
 }

@@ -1,13 +1,14 @@
 //! Interface faces: each in exactly two sub-domains, the same from both.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 
 use tetdb_schema::digest::Digest;
 use tetdb_schema::record::InterfaceFace;
 
-use super::{Finding, Offender, Report};
-use crate::sealed::Corner;
+use super::{Finding, Report};
+use crate::sealed::{Corner, MergeReader};
 use crate::store::StoreError;
 use tetdb_base::storage::{Sorter, StorageError, sort_record};
 use tetdb_schema::catalog::InterfaceRow;
@@ -43,7 +44,7 @@ struct SharedFaces {
 }
 
 /// All interface faces of all sub-domains, and the digests by cut and pair, from either side.
-pub(super) struct Interfaces {
+pub(super) struct InterfaceAudit {
     sorter: Sorter<FaceSide>,
     /// From the lower and from the higher side.
     sides: BTreeMap<CutPair, [SharedFaces; 2]>,
@@ -79,7 +80,7 @@ impl SharedFaces {
     }
 }
 
-impl Interfaces {
+impl InterfaceAudit {
     pub(super) fn new(dir: &Path, memory_bytes: usize) -> Self {
         Self { sorter: Sorter::new(dir, memory_bytes as u64), sides: BTreeMap::new() }
     }
@@ -152,17 +153,8 @@ impl Interfaces {
         rows: &[InterfaceRow],
         report: &mut Report,
     ) -> Result<(), StoreError> {
-        let mut group: Vec<FaceSide> = Vec::new();
-        for side in self.sorter.finish()? {
-            let side = side?;
-            let is_other = |first: &FaceSide| (first.cut, first.index) != (side.cut, side.index);
-            if group.first().is_some_and(is_other) {
-                compare_sides(&group, report);
-                group.clear();
-            }
-            group.push(side);
-        }
-        if !group.is_empty() {
+        let (mut sides, mut group) = (MergeReader::new(self.sorter.finish()?), Vec::new());
+        while sides.next_group(&mut group, |a, b| (a.cut, a.index) == (b.cut, b.index))? {
             compare_sides(&group, report);
         }
         let mut expected: BTreeMap<CutPair, SharedFaces> =
@@ -183,29 +175,23 @@ impl Interfaces {
 fn compare_sides(group: &[FaceSide], report: &mut Report) {
     let [a, b] = group else {
         let count = group.len();
-        return unmatched(&group[0], format!("{count} faces instead of 2"), report);
+        return unmatched(&group[0], format_args!("{count} faces instead of 2"), report);
     };
     if a.subdomain != b.other || a.other != b.subdomain {
-        unmatched(a, "its sub-domains do not name each other".into(), report);
+        unmatched(a, "its sub-domains do not name each other", report);
     } else if (a.ids, a.sum) != (b.ids, b.sum) {
-        unmatched(a, "its vertices differ between the sides".into(), report);
+        unmatched(a, "its vertices differ between the sides", report);
     }
 }
 
-fn unmatched(side: &FaceSide, what: String, report: &mut Report) {
-    let finding = Finding::UnmatchedInterface;
-    report.find(finding, || {
-        let what = format!("face {} of cut {}: {what}", side.index, side.cut);
-        Offender::new(finding, Some(side.subdomain), what)
-    });
+fn unmatched(side: &FaceSide, what: impl Display, report: &mut Report) {
+    let what = format_args!("face {} of cut {}: {what}", side.index, side.cut);
+    report.find(Finding::UnmatchedInterface, side.subdomain, what);
 }
 
 fn differs(CutPair { cut, low, high }: CutPair, report: &mut Report) {
-    let finding = Finding::CatalogDiffers;
-    report.find(finding, || {
-        let what = format!(
-            "the interface of sub-domains {low} and {high} by cut {cut} is not what its row says"
-        );
-        Offender::new(finding, Some(low), what)
-    });
+    let what = format_args!(
+        "the interface of sub-domains {low} and {high} by cut {cut} is not what its row says"
+    );
+    report.find(Finding::CatalogDiffers, low, what);
 }

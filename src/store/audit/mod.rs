@@ -11,12 +11,10 @@
 //!
 //! Sub-domains are looked at one by one, by whatever process; what is found of each is added up in their order.
 //!
-//! Reading order: [`Report`] (what is found), `claims` (facets say which tetrahedra they touch),
-//! `pass` (once through a sub-domain), `part_report` (what is found there), `pairing` (faces across chunks), `interface` (faces across
+//! Reading order: [`Report`] (what is found), `pass` (once through a sub-domain), `part_report` (what is found there), `pairing` (faces across chunks), `interface` (faces across
 //! sub-domains), `against` and `wires` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
 
 mod against;
-mod claims;
 mod compare;
 mod damage;
 mod interface;

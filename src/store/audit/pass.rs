@@ -8,19 +8,22 @@ use tetdb_schema::digest::Digest;
 use tetdb_schema::record::{FACES, NO_TET, SealedTet};
 
 use super::against::{Input, check_owners};
-use super::claims::{Claims, FACET, INTERFACE, SortedClaims};
-use super::interface::Interfaces;
-use super::pairing::{OpenSides, Side};
+use super::interface::InterfaceAudit;
+use super::pairing::{OpenSide, OpenSides};
 use super::part_report::{PartReport, Volumes};
 use super::rows::{Rederived, RegionSums, check_regions};
 use super::wires::WireSearch;
-use super::{Finding, Level, Offender, Report, VerifyOptions};
-use crate::sealed::SealedError;
-use crate::sealed::{Corner, FacePairs, Paired, Subdomain, sorted_face};
+use super::{Finding, Level, Report, VerifyOptions};
+use crate::sealed::{Corner, FaceJoin, FaceJoinSorter, FacePairs, Paired, Subdomain, sorted_face};
 use crate::store::StoreError;
 use tetdb_base::geom::{Point, insphere, orient};
 use tetdb_base::storage::{check_cancelled, parallel};
 use tetdb_schema::catalog::{InterfaceRow, RegionRow};
+
+/// Marks of faces: the reasons for which a face is required.
+const FACET: u8 = 1;
+/// See [`FACET`].
+const INTERFACE: u8 = 2;
 
 /// Volumes that agree this well, relative to the sum of what was added, are the same: sums of
 /// millions of terms lose some six of sixteen digits at most.
@@ -32,7 +35,7 @@ pub(super) struct Audit<'a> {
     scratch: &'a Path,
     input: Option<Input<'a>>,
     wires: Option<WireSearch<'a>>,
-    interfaces: Interfaces,
+    interfaces: InterfaceAudit,
     pairs: FacePairs,
     report: Report,
     digests: [Digest; 2],
@@ -63,7 +66,7 @@ impl<'a> Audit<'a> {
             scratch,
             input: surface.map(Input::new),
             wires: surface.and_then(WireSearch::new),
-            interfaces: Interfaces::new(scratch, options.memory_bytes / 16),
+            interfaces: InterfaceAudit::new(scratch, options.memory_bytes / 16),
             pairs: FacePairs::new(SealedTet::COUNT_MAX),
             report,
             digests: [Digest::default(); 2],
@@ -98,18 +101,14 @@ impl<'a> Audit<'a> {
         let mut claims = self.facets(part, &mut used)?;
         let digest = self.tets(part, &mut claims, &mut used)?;
         while let Some(claim) = claims.next_below(u32::MAX)? {
-            self.stray(part, claim.tet, &claim.face)?;
+            self.stray(part, claim.tet, &claim.vertices)?;
         }
         self.unused(part, &used)?;
         if digest[0].lanes != row.digest || digest[1].lanes != row.interface_digest {
-            let finding = Finding::CatalogDiffers;
-            self.report.find(finding, || {
-                let what = format!(
-                    "the digests are {} and {}, not those of the catalog",
-                    digest[0], digest[1]
-                );
-                Offender::new(finding, Some(row.rank), what)
-            });
+            let [own, interface] = digest;
+            let what =
+                format_args!("the digests are {own} and {interface}, not those of the catalog");
+            self.report.find(Finding::CatalogDiffers, row.rank, what);
         }
         for (sum, part) in self.digests.iter_mut().zip(digest) {
             sum.merge(&part);
@@ -117,14 +116,10 @@ impl<'a> Audit<'a> {
         Ok(())
     }
 
-    /// Reads facets; returns what they and the interface faces say of tetrahedra.
-    fn facets(
-        &mut self,
-        part: &mut Subdomain,
-        used: &mut [u64],
-    ) -> Result<SortedClaims, StoreError> {
+    /// Reads facets and interface faces; returns the faces that they name of tetrahedra.
+    fn facets(&mut self, part: &mut Subdomain, used: &mut [u64]) -> Result<FaceJoin, StoreError> {
         let rank = part.id().rank();
-        let mut claims = Claims::new(self.scratch, self.options.memory_bytes / 8);
+        let mut claims = FaceJoinSorter::new(self.scratch, self.options.memory_bytes as u64 / 8);
         let (chunks, total) = (part.row().chunks[2], part.row().facets);
         let mut n = 0;
         for chunk in 0..chunks {
@@ -135,7 +130,7 @@ impl<'a> Audit<'a> {
                 mark(used, &facet.vertices);
                 for (side, tet) in facet.tets.into_iter().enumerate() {
                     if tet != NO_TET {
-                        claims.push(tet, facet.vertices, side == 0, FACET)?;
+                        claims.push(tet, facet.vertices, side == 0, FACET.into())?;
                     }
                 }
                 if self.level(Level::Geometry) {
@@ -155,7 +150,7 @@ impl<'a> Audit<'a> {
     fn interface_faces(
         &mut self,
         part: &mut Subdomain,
-        claims: &mut Claims,
+        claims: &mut FaceJoinSorter,
     ) -> Result<(), StoreError> {
         let rank = part.id().rank();
         let (chunks, total) = (part.row().chunks[3], part.row().interface_faces);
@@ -164,7 +159,7 @@ impl<'a> Audit<'a> {
             for face in part.interface_chunk(chunk)?.records {
                 n += 1;
                 let corners = part.corners(face.vertices)?;
-                claims.push(face.tet, face.vertices, false, INTERFACE)?;
+                claims.push(face.tet, face.vertices, false, INTERFACE.into())?;
                 self.interfaces.push(rank, &face, &corners)?;
             }
         }
@@ -187,7 +182,7 @@ impl<'a> Audit<'a> {
     fn tets(
         &mut self,
         part: &mut Subdomain,
-        claims: &mut SortedClaims,
+        claims: &mut FaceJoin,
         used: &mut [u64],
     ) -> Result<[Digest; 2], StoreError> {
         let rank = part.id().rank();
@@ -200,14 +195,9 @@ impl<'a> Audit<'a> {
             let chunk = part.tet_chunk(place as u32)?;
             let summary = part.tet_summaries()[place];
             if chunk.first != expected {
-                return Err(StoreError::Sealed(SealedError::Content {
-                    path: part.path().to_owned(),
-                    subdomain: rank,
-                    what: format!(
-                        "a chunk of tetrahedra starts at {}, expected {expected}",
-                        chunk.first
-                    ),
-                }));
+                let found = chunk.first;
+                let what = format!("a chunk of tetrahedra starts at {found}, expected {expected}");
+                return Err(part.damaged(what).into());
             }
             expected += chunk.records.len() as u32;
             let tets = &chunk.records;
@@ -247,12 +237,8 @@ impl<'a> Audit<'a> {
     fn distinct(&mut self, rank: u32, number: u32, tet: &SealedTet, corners: &[Corner; 4]) {
         let [a, b, c, d] = tet.nodes;
         if a == b || a == c || a == d || b == c || b == d || c == d {
-            let finding = Finding::RepeatedNode;
-            self.report.find(finding, || {
-                Offender::new(finding, Some(rank), "two nodes are the same")
-                    .with_tet(number)
-                    .with_corners(corners)
-            });
+            let found = self.report.find(Finding::RepeatedNode, rank, "two nodes are the same");
+            found.with_tet(number).with_corners(corners);
         }
     }
 
@@ -260,19 +246,17 @@ impl<'a> Audit<'a> {
     fn marks(
         &mut self,
         part: &mut Subdomain,
-        claims: &mut SortedClaims,
+        claims: &mut FaceJoin,
         first: u32,
         tets: &[SealedTet],
     ) -> Result<Vec<[u8; 4]>, StoreError> {
         let mut marks = vec![[0; 4]; tets.len()];
         while let Some(claim) = claims.next_below(first + tets.len() as u32)? {
             let place = (claim.tet - first) as usize;
-            let nodes = tets[place].nodes;
-            let face = (0..4)
-                .find(|&i| sorted_face(FACES[i].map(|k| nodes[k])) == (claim.face, claim.odd));
-            match face {
-                Some(i) if marks[place][i] & claim.kind == 0 => marks[place][i] |= claim.kind,
-                _ => self.stray(part, claim.tet, &claim.face)?,
+            let mark = claim.mark as u8;
+            match claim.place(tets[place].nodes) {
+                Some(i) if marks[place][i] & mark == 0 => marks[place][i] |= mark,
+                _ => self.stray(part, claim.tet, &claim.vertices)?,
             }
         }
         Ok(marks)
@@ -281,13 +265,9 @@ impl<'a> Audit<'a> {
     fn stray(&mut self, part: &mut Subdomain, tet: u32, face: &[u32; 3]) -> Result<(), StoreError> {
         let corners = part.corners(*face)?;
         if self.level(Level::Topology) {
-            let finding = Finding::StrayFacet;
-            self.report.find(finding, || {
-                let what = "the tetrahedron named by a facet or interface face does not have it on that side, or is named twice";
-                Offender::new(finding, Some(part.id().rank()), what)
-                    .with_tet(tet)
-                    .with_corners(&corners)
-            });
+            let what = "the tetrahedron named by a facet or interface face does not have it on that side, or is named twice";
+            let found = self.report.find(Finding::StrayFacet, part.id().rank(), what);
+            found.with_tet(tet).with_corners(&corners);
         }
         Ok(())
     }
@@ -306,12 +286,9 @@ impl<'a> Audit<'a> {
         for (i, &six_volumes) in volumes.iter().enumerate() {
             self.volumes.of_tets += six_volumes / 6.0;
             if six_volumes <= 0.0 {
-                let finding = Finding::NotPositive;
-                self.report.find(finding, || {
-                    Offender::new(finding, Some(rank), "its orientation is not positive")
-                        .with_tet(first + i as u32)
-                        .with_corners(&corners[i])
-                });
+                let what = "its orientation is not positive";
+                let found = self.report.find(Finding::NotPositive, rank, what);
+                found.with_tet(first + i as u32).with_corners(&corners[i]);
             }
         }
     }
@@ -346,7 +323,7 @@ impl<'a> Audit<'a> {
         for (key, odd, reference) in self.pairs.open() {
             let (t, i) = (reference as usize / 4, reference as usize % 4);
             n_open += 1;
-            open.push(&Side {
+            open.push(&OpenSide {
                 face: key,
                 odd,
                 reference: first * 4 + reference,
@@ -356,14 +333,10 @@ impl<'a> Audit<'a> {
             })?;
         }
         if n_open != summary.open_faces {
-            let finding = Finding::CatalogDiffers;
-            self.report.find(finding, || {
-                let what = format!(
-                    "a chunk has {n_open} open faces, its summary counts {}",
-                    summary.open_faces
-                );
-                Offender::new(finding, Some(rank), what).with_tet(first)
-            });
+            let counted = summary.open_faces;
+            let what =
+                format_args!("a chunk has {n_open} open faces, its summary counts {counted}");
+            self.report.find(Finding::CatalogDiffers, rank, what).with_tet(first);
         }
         self.report.inner_faces += inner.len() as u64;
         for pair in &inner {
@@ -393,11 +366,9 @@ impl<'a> Audit<'a> {
     }
 
     fn crowded(&mut self, rank: u32, tet: u32, corners: &[Corner; 3]) {
-        let finding = Finding::CrowdedFace;
-        self.report.find(finding, || {
-            let what = "more than one tetrahedron on one side of a face";
-            Offender::new(finding, Some(rank), what).with_tet(tet).with_corners(corners)
-        });
+        let what = "more than one tetrahedron on one side of a face";
+        let found = self.report.find(Finding::CrowdedFace, rank, what);
+        found.with_tet(tet).with_corners(corners);
     }
 
     /// The two sides of an inner face: the same marks, none of them an interface's, and the same region where there are none.
@@ -425,13 +396,11 @@ impl<'a> Audit<'a> {
         } else {
             return;
         };
-        self.report.find(finding, || {
-            Offender::new(finding, Some(rank), what).with_tet(tet).with_corners(corners)
-        });
+        self.report.find(finding, rank, what).with_tet(tet).with_corners(corners);
     }
 
     /// A face that its chunk left open, with all its sides.
-    fn open_face(&mut self, part: &mut Subdomain, sides: &[Side]) -> Result<(), StoreError> {
+    fn open_face(&mut self, part: &mut Subdomain, sides: &[OpenSide]) -> Result<(), StoreError> {
         let rank = part.id().rank();
         let tet = sides[0].reference / 4;
         match sides {
@@ -441,13 +410,9 @@ impl<'a> Audit<'a> {
                 }
                 if one.mark == 0 {
                     let corners = part.corners(one.face)?;
-                    let finding = Finding::OpenFace;
-                    self.report.find(finding, || {
-                        let what = "a face with one side is neither a facet nor an interface face";
-                        Offender::new(finding, Some(rank), what)
-                            .with_tet(tet)
-                            .with_corners(&corners)
-                    });
+                    let what = "a face with one side is neither a facet nor an interface face";
+                    let found = self.report.find(Finding::OpenFace, rank, what);
+                    found.with_tet(tet).with_corners(&corners);
                 }
             }
             [a, b] if a.odd != b.odd => {
@@ -476,11 +441,9 @@ impl<'a> Audit<'a> {
         for v in 0..part.row().vertices as u32 {
             if used[v as usize / 64] >> (v % 64) & 1 == 0 {
                 let corner = part.corner(v)?;
-                let finding = Finding::UnusedVertex;
-                self.report.find(finding, || {
-                    let what = "no tetrahedron and no facet has the vertex";
-                    Offender::new(finding, Some(part.id().rank()), what).with_corners(&[corner])
-                });
+                let what = "no tetrahedron and no facet has the vertex";
+                let found = self.report.find(Finding::UnusedVertex, part.id().rank(), what);
+                found.with_corners(&[corner]);
             }
         }
         Ok(())
@@ -539,13 +502,10 @@ impl<'a> Audit<'a> {
             let tolerance =
                 VOLUME_TOLERANCE * self.volumes.scale.max(found) + self.volumes.rounding;
             if (found - expected).abs() > tolerance {
-                let finding = Finding::VolumeDiffers;
-                self.report.find(finding, || {
-                    let what = format!(
-                        "the tetrahedra have volume {found}, their boundary encloses {expected}"
-                    );
-                    Offender::new(finding, None, what)
-                });
+                let what = format_args!(
+                    "the tetrahedra have volume {found}, their boundary encloses {expected}"
+                );
+                self.report.find(Finding::VolumeDiffers, None, what);
             }
             if let Some(input) = self.input.take() {
                 input.finish(&mut self.report);
@@ -565,11 +525,8 @@ fn counted(part: &Subdomain, what: &str, found: u64, total: u64) -> Result<(), S
     if found == total {
         return Ok(());
     }
-    Err(StoreError::Sealed(SealedError::Content {
-        path: part.path().to_owned(),
-        subdomain: part.id().rank(),
-        what: format!("its chunks hold {found} {what}, the catalog counts {total}"),
-    }))
+    let what = format!("its chunks hold {found} {what}, the catalog counts {total}");
+    Err(part.damaged(what).into())
 }
 
 fn mark(used: &mut [u64], vertices: &[u32]) {

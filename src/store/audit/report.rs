@@ -1,17 +1,20 @@
-//! What a verification found.
+//! The result of a verification: counts, findings and examples.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 
 use serde::Serialize;
 use tetdb_schema::ids::VertexId;
 
 use crate::sealed::Corner;
+use tetdb_base::geom::Point;
 
 /// Offenders kept for each kind of finding; all are counted.
 const OFFENDERS_KEPT: u64 = 10;
 
 /// The levels of checking, each with those before it.
 #[derive(
+    Default,
     Clone,
     Copy,
     Debug,
@@ -27,6 +30,7 @@ const OFFENDERS_KEPT: u64 = 10;
 #[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Every record can be read and counts agree; nodes exist and differ; digests are right.
+    #[default]
     Element,
     /// Every face has two sides, or one and is required.
     Adjacency,
@@ -107,7 +111,9 @@ pub struct Offender {
 }
 
 /// The result of a verification.
-#[derive(Clone, Debug, PartialEq, Serialize, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
+#[derive(
+    Default, Clone, Debug, PartialEq, Serialize, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize,
+)]
 pub struct Report {
     /// How much was checked.
     pub level: Level,
@@ -163,36 +169,10 @@ pub struct Report {
 
 impl Report {
     pub(super) fn new(level: Level) -> Self {
-        Self {
-            level,
-            valid: true,
-            against_input: false,
-            subdomains: 0,
-            tets: 0,
-            vertices: 0,
-            facets: 0,
-            interface_faces: 0,
-            inner_faces: 0,
-            boundary_faces: 0,
-            triangles_present: 0,
-            triangles_unfilled: 0,
-            triangles_missing: 0,
-            edges_present: 0,
-            edges_missing: 0,
-            points_present: 0,
-            points_missing: 0,
-            volume: 0.0,
-            volume_within_boundary: 0.0,
-            delaunay_tested: 0,
-            delaunay_faces: 0,
-            digest: String::new(),
-            interface_digest: String::new(),
-            findings: BTreeMap::new(),
-            offenders: Vec::new(),
-        }
+        Self { level, valid: true, ..Self::default() }
     }
 
-    /// Adds what was found of another part of the mesh. What is said of the whole alone, volumes, digests and the input, is left.
+    /// Adds the counts and findings of another part of the mesh; volumes, digests and the input are left to the whole.
     pub(super) fn add(&mut self, part: Self) {
         for (sum, n) in [
             (&mut self.subdomains, part.subdomains),
@@ -232,44 +212,60 @@ impl Report {
         self.findings.get(&finding).copied().unwrap_or(0)
     }
 
-    /// Counts a finding; `describe` is called for the first few of its kind.
-    pub(super) fn find(&mut self, finding: Finding, describe: impl FnOnce() -> Offender) {
+    /// Counts a finding; the first few of its kind are kept, and described by `what` as a sentence.
+    pub(super) fn find(
+        &mut self,
+        finding: Finding,
+        subdomain: impl Into<Option<u32>>,
+        what: impl Display,
+    ) -> KeptOffender<'_> {
         self.valid = false;
         let count = self.findings.entry(finding).or_default();
         *count += 1;
-        if *count <= OFFENDERS_KEPT {
-            self.offenders.push(describe());
+        if *count > OFFENDERS_KEPT {
+            return KeptOffender(None);
         }
-    }
-}
-
-impl Offender {
-    pub(super) fn new(finding: Finding, subdomain: Option<u32>, what: impl Into<String>) -> Self {
-        Self {
+        self.offenders.push(Offender {
             finding,
-            subdomain,
+            subdomain: subdomain.into(),
             tet: None,
             vertices: Vec::new(),
             points: Vec::new(),
-            what: what.into(),
-        }
+            what: what.to_string(),
+        });
+        KeptOffender(self.offenders.last_mut())
+    }
+}
+
+/// An offender being described, unless enough of its kind are kept.
+pub(super) struct KeptOffender<'a>(Option<&'a mut Offender>);
+
+impl KeptOffender<'_> {
+    /// Adds its tetrahedron.
+    pub(super) fn with_tet(self, local: u32) -> Self {
+        Self(self.0.map(|offender| {
+            let subdomain = offender.subdomain.unwrap_or_default();
+            offender.tet = Some(format!("{subdomain}:{local}"));
+            offender
+        }))
     }
 
-    pub(super) fn with_tet(mut self, local: u32) -> Self {
-        let subdomain = self.subdomain.unwrap_or_default();
-        self.tet = Some(format!("{subdomain}:{local}"));
-        self
+    /// Adds ids and positions of vertices.
+    pub(super) fn with_corners(self, corners: &[Corner]) -> Self {
+        let Some(offender) = self.0 else { return self };
+        let id = |c: &Corner| match VertexId::from_number(c.id) {
+            Some(id) => id.to_string(),
+            None => format!("{:#x}", c.id),
+        };
+        offender.vertices = corners.iter().map(id).collect();
+        Self(Some(offender)).with_points(corners.iter().map(|c| c.point))
     }
 
-    pub(super) fn with_corners(mut self, corners: &[Corner]) -> Self {
-        self.vertices = corners
-            .iter()
-            .map(|c| match VertexId::from_number(c.id) {
-                Some(id) => id.to_string(),
-                None => format!("{:#x}", c.id),
-            })
-            .collect();
-        self.points = corners.iter().map(|c| c.point.to_array()).collect();
-        self
+    /// Adds positions.
+    pub(super) fn with_points(self, points: impl IntoIterator<Item = Point>) -> Self {
+        Self(self.0.map(|offender| {
+            offender.points = points.into_iter().map(|p| p.to_array()).collect();
+            offender
+        }))
     }
 }

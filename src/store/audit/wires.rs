@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::against::input_vertex;
-use super::{Finding, Offender, Report};
+use super::{Finding, Report};
 use crate::sealed::Corner;
 use tetdb_base::surface::Surface;
 
@@ -110,12 +110,8 @@ impl<'a> WireSearch<'a> {
         report.edges_missing = edges.len() as u64 - report.edges_present;
         report.points_missing = points.len() as u64 - report.points_present;
         let mut lose = |finding, what: String, vertices: &[u32]| {
-            report.find(finding, || {
-                let mut offender = Offender::new(finding, None, what);
-                let point = |&v: &u32| self.surface.points[v as usize].to_array();
-                offender.points = vertices.iter().map(point).collect();
-                offender
-            });
+            let point = |&v: &u32| self.surface.points[v as usize];
+            report.find(finding, None, what).with_points(vertices.iter().map(point));
         };
         for (e, _) in edges.iter().enumerate().filter(|(_, is_seen)| !**is_seen) {
             let [a, b, _] = wires.edges[e];

@@ -1,7 +1,7 @@
 //! A decoded chunk of tetrahedra with the vertices it needs, free of everything else.
 
 use super::hit::Hit;
-use super::tree::BoxTree;
+use super::tree::OctalBoxTree;
 use crate::sealed::{Chunk, Corner, Subdomain};
 use crate::store::StoreError;
 use tetdb_base::geom::{Aabb, IdMap, Point};
@@ -29,7 +29,7 @@ pub(super) struct DecodedChunk {
 /// A frame of a whole chunk, and a tree to find points in it.
 pub(super) struct Searched {
     pub frame: DecodedChunk,
-    pub tree: BoxTree,
+    pub tree: OctalBoxTree,
 }
 
 impl DecodedChunk {
@@ -100,7 +100,7 @@ impl DecodedChunk {
 impl Searched {
     pub fn new(frame: DecodedChunk) -> Self {
         let around = |i: usize| Aabb::around(frame.corners(&frame.tets[i]));
-        let tree = BoxTree::new(frame.tets.len(), around);
+        let tree = OctalBoxTree::new(frame.tets.len(), around);
         Self { frame, tree }
     }
 

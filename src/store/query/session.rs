@@ -9,8 +9,7 @@ use tetdb_schema::record::SealedTet;
 use super::QueryError;
 use super::decoded::{DecodedChunk, Searched};
 use super::surface_faces::SurfaceFaces;
-use super::tree::BoxTree;
-use crate::sealed::SealedError;
+use super::tree::OctalBoxTree;
 use crate::sealed::{Chunk, Subdomain};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
@@ -45,7 +44,7 @@ pub struct Measures {
 pub struct OpenSubdomain {
     pub subdomain: Subdomain,
     /// Over the boxes of its chunks of tetrahedra.
-    pub(super) tree: BoxTree,
+    pub(super) tree: OctalBoxTree,
     _lease: Option<Lease>,
 }
 
@@ -94,7 +93,7 @@ pub struct QuerySession {
     /// Embedded edges and points.
     pub wires: WiresRow,
     /// Over the boxes of the sub-domains.
-    pub(super) tree: BoxTree,
+    pub(super) tree: OctalBoxTree,
     bounds: Aabb,
     parts: LruCache<u32, OpenSubdomain>,
     parts_max: usize,
@@ -163,7 +162,7 @@ impl QuerySession {
         let bounds = (rows.iter().map(bounds_of)).fold(Aabb::EMPTY, Aabb::union);
         Ok(Self {
             store,
-            tree: BoxTree::new(rows.len(), |i| bounds_of(&rows[i])),
+            tree: OctalBoxTree::new(rows.len(), |i| bounds_of(&rows[i])),
             rows,
             labels,
             region_names,
@@ -236,7 +235,7 @@ impl QuerySession {
                 more => Some(self.budget.lease(more, "summaries of a sub-domain")?),
             };
             let tree =
-                BoxTree::new(subdomain.tet_summaries().len(), |i| chunk_bounds(&subdomain, i));
+                OctalBoxTree::new(subdomain.tet_summaries().len(), |i| chunk_bounds(&subdomain, i));
             let part = OpenSubdomain { subdomain, tree, _lease: lease };
             self.parts.put(rank, part);
         }
@@ -321,11 +320,8 @@ pub fn checked_chunk(part: &mut Subdomain, chunk: u32) -> Result<Chunk<SealedTet
     {
         return Ok(records);
     }
-    Err(StoreError::Sealed(SealedError::Content {
-        path: part.path().to_owned(),
-        subdomain: part.id().rank(),
-        what: format!("chunk {chunk} of tetrahedra is not the one its summary tells of"),
-    }))
+    let what = format!("chunk {chunk} of tetrahedra is not the one its summary tells of");
+    Err(part.damaged(what).into())
 }
 
 /// The box of a sub-domain.

@@ -140,11 +140,8 @@ impl CoarseSnapshot {
     /// Errors: damage.
     pub fn open(path: &DiskPath, row: CoarseRow, cache_bytes: usize) -> Result<Self, SealedError> {
         if !path.is_file() {
-            return Err(SealedError::Content {
-                path: path.path().to_owned(),
-                subdomain: row.rank,
-                what: "the file of its coarse snapshot is missing".to_owned(),
-            });
+            let what = "the file of its coarse snapshot is missing";
+            return Err(SealedError::content(path.path(), row.rank, what));
         }
         let file = StoreFile::open_repaired(path, cache_bytes, false)?;
         Ok(Self { row, file })

@@ -172,11 +172,8 @@ impl<R: PageRecord> Loader<R> {
 }
 
 fn missing(file: &StoreFile, address: ChunkAddress, what: &str) -> SealedError {
-    SealedError::Content {
-        path: file.path().to_owned(),
-        subdomain: address.subdomain,
-        what: format!("{:?} {what} {} is missing", address.kind, address.chunk),
-    }
+    let what = format!("{:?} {what} {} is missing", address.kind, address.chunk);
+    SealedError::content(file.path(), address.subdomain, what)
 }
 
 fn read_page<R: PageRecord>(

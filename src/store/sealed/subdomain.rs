@@ -59,11 +59,7 @@ impl Subdomain {
             path: path.path().to_owned(),
             subdomain: rank,
         })?;
-        let damaged = |what: String| SealedError::Content {
-            path: path.path().to_owned(),
-            subdomain: rank,
-            what,
-        };
+        let damaged = |what: String| SealedError::content(path.path(), rank, what);
         let id = SubdomainId::new(rank).ok_or_else(|| damaged("its rank is too high".into()))?;
         if !path.is_file() {
             return Err(damaged("its file is missing".into()));
@@ -185,10 +181,8 @@ impl Subdomain {
         let path = self.file.path().to_owned();
         flatten(self.tet_chunks()).map(move |item| {
             let (place, tet) = item?;
-            let id = TetId::new(id, place).ok_or_else(|| SealedError::Content {
-                path: path.clone(),
-                subdomain: id.rank(),
-                what: format!("tetrahedron {place} has no id"),
+            let id = TetId::new(id, place).ok_or_else(|| {
+                SealedError::content(&path, id.rank(), format!("tetrahedron {place} has no id"))
             })?;
             Ok((id, tet))
         })
@@ -334,11 +328,7 @@ impl<R: ChunkRecord> Chunks<'_, R> {
     }
 
     fn contradiction(&self, what: String) -> SealedError {
-        SealedError::Content {
-            path: self.file.path().to_owned(),
-            subdomain: self.address.subdomain,
-            what,
-        }
+        SealedError::content(self.file.path(), self.address.subdomain, what)
     }
 }
 

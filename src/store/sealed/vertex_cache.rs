@@ -166,11 +166,8 @@ impl VertexCache {
 
     #[cold]
     fn no_such_vertex(&self, file: &StoreFile, v: u32) -> SealedError {
-        SealedError::Content {
-            path: file.path().to_owned(),
-            subdomain: self.subdomain,
-            what: format!("vertex {v} is named, there are {}", self.n_vertices),
-        }
+        let what = format!("vertex {v} is named, there are {}", self.n_vertices);
+        SealedError::content(file.path(), self.subdomain, what)
     }
 
     #[cold]
@@ -184,14 +181,9 @@ impl VertexCache {
         let first = self.loader.load(file, address, &mut self.scratch)?;
         self.loads += 1;
         if first != self.firsts[chunk] {
-            return Err(SealedError::Content {
-                path: file.path().to_owned(),
-                subdomain: self.subdomain,
-                what: format!(
-                    "vertex chunk {chunk} starts at {first}, expected {}",
-                    self.firsts[chunk]
-                ),
-            });
+            let expected = self.firsts[chunk];
+            let what = format!("vertex chunk {chunk} starts at {first}, expected {expected}");
+            return Err(SealedError::content(file.path(), self.subdomain, what));
         }
         let needed = self.scratch.len() * size_of::<Corner>();
         while self.bytes + needed > self.bytes_max && self.order.len() >= CHUNKS_LEAST {
