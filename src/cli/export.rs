@@ -12,7 +12,9 @@ use super::query;
 use super::query_ask::regions;
 use tetdb_engine::api::targets::{check_target, inputs_of};
 use tetdb_engine::api::{Error, Exported, Settings, show};
-use tetdb_io::write::{Content, ENDINGS, MeshFormat, Order, Selection, Share, Writers, check};
+use tetdb_io::write::{
+    Content, ENDINGS, ElementOrder, ExportSelection, MeshFormat, Share, Writers, check,
+};
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     let is_first = share_of_ranks().is_none_or(|share| share.number == 1);
@@ -78,7 +80,7 @@ fn write_share(
         Some(text) => regions(text, &show::region_names(&args.store)?)?,
         None => Vec::new(),
     };
-    let mut selection = Selection {
+    let mut selection = ExportSelection {
         subdomains: args.subdomain.iter().copied().collect(),
         regions: regions.into_iter().collect(),
         pieces: args.pieces,
@@ -93,8 +95,8 @@ fn write_share(
         ghosts: args.ghosts,
         split_sheets: args.split_sheets,
         order: match args.order {
-            2 => Order::Second,
-            _ => Order::First,
+            2 => ElementOrder::Second,
+            _ => ElementOrder::First,
         },
     };
     let mut outs = Vec::new();
@@ -186,7 +188,7 @@ pub fn check_format(out: &Path) -> Result<(), Failure> {
 pub fn write(
     path: &Path,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
     settings: &Settings,
     console: &Console,
 ) -> Result<Exported, Failure> {
@@ -196,7 +198,7 @@ pub fn write(
 /// The same, as one of several processes that write the file together.
 fn write_with(
     (path, out): (&Path, &Path),
-    selection: &Selection,
+    selection: &ExportSelection,
     settings: &Settings,
     console: &Console,
     writers: Option<&dyn Writers>,

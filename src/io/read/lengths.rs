@@ -46,7 +46,7 @@ pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
 }
 
 /// Bytes of a number, and whether the high ones come first.
-type Kind = (usize, bool);
+type NumberFormat = (usize, bool);
 
 /// An array file, read from its beginning on.
 struct ArrayFile {
@@ -76,7 +76,7 @@ impl ArrayFile {
         Ok(bytes)
     }
 
-    fn number(&mut self, (bytes, big): Kind) -> Result<f64> {
+    fn number(&mut self, (bytes, big): NumberFormat) -> Result<f64> {
         let mut word = self.take(bytes)?;
         if big {
             word.reverse();
@@ -88,7 +88,7 @@ impl ArrayFile {
     }
 
     /// Reads the head: how many numbers follow, and their kind.
-    fn head(&mut self) -> Result<(u64, Kind)> {
+    fn head(&mut self) -> Result<(u64, NumberFormat)> {
         let start = self.take(8)?;
         if !start.starts_with(MAGIC) {
             let found = format!("{:x?}", &start[..6]);

@@ -228,7 +228,7 @@ fn read_feed<R: BufRead>(
         Format::Medit => medit::read(feed, false, target),
         Format::MeditBinary => medit::read(feed, true, target),
         Format::Gmsh => gmsh::read(feed, target),
-        Format::TetgenSmesh => tetgen::read(feed, tetgen::Kind::Smesh, nodes, limit, target),
-        Format::TetgenPoly => tetgen::read(feed, tetgen::Kind::Poly, nodes, limit, target),
+        Format::TetgenSmesh => tetgen::read(feed, tetgen::FacetLayout::Smesh, nodes, limit, target),
+        Format::TetgenPoly => tetgen::read(feed, tetgen::FacetLayout::Poly, nodes, limit, target),
     }
 }

@@ -15,7 +15,7 @@ use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceError, VolumePoints};
 
 /// The two layouts of the facet part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum FacetLayout {
     /// One polygon per facet, the boundary marker after it.
     Smesh,
     /// Facets of several polygons and holes, the marker before them.
@@ -31,7 +31,7 @@ struct Numbering {
 
 pub(super) fn read<R: BufRead>(
     mut feed: Feed<R>,
-    kind: Kind,
+    kind: FacetLayout,
     nodes: Option<&Path>,
     limit: u64,
     target: &mut SurfaceSink,
@@ -47,12 +47,12 @@ pub(super) fn read<R: BufRead>(
     for i in 0..n_facets {
         feed.need_record("facets", n_facets, i)?;
         match kind {
-            Kind::Smesh => {
+            FacetLayout::Smesh => {
                 let corners = read_polygon(&mut feed, numbering)?;
                 let marker = rest_of_line(&mut feed)?.pop().unwrap_or(0);
                 add(&feed, &corners, marker, target)?;
             }
-            Kind::Poly => n_split += u64::from(read_facet(&mut feed, numbering, target)?),
+            FacetLayout::Poly => n_split += u64::from(read_facet(&mut feed, numbering, target)?),
         }
     }
     if n_split > 0 {

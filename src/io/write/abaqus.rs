@@ -5,11 +5,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::names::set_names;
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_store::sealed::{FaceJoin, FaceJoinSorter};
@@ -39,7 +39,7 @@ sort_record! {
 
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
     midpoints: Option<&Midpoints>,
 ) -> Result<()> {
@@ -49,7 +49,7 @@ pub(super) fn write(
     let n_midpoints = midpoints.map_or(0, Midpoints::n);
     let numbers = if n_midpoints > 0 { 11 } else { 5 };
     let bytes = 60 * (mesh.n_vertices() + n_midpoints) + numbers * (digits + 2) * mesh.n_tets();
-    let path = draft.create(out, bytes)?;
+    let path = outputs.create(out, bytes)?;
     let mut stream = Stream::open(&path)?;
     stream.text("*HEADING\nexported by tetdb\n*NODE, NSET=all_nodes\n");
     let mut put = |number: u64, point: [f64; 3]| {

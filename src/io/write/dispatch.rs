@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::Result;
 use super::format::MeshFormat;
 use super::merged::Merged;
 use super::midpoints::Midpoints;
+use super::output_files::OutputFiles;
 use super::report::FileCounts;
-use super::selection::{Content, Order, Selection};
+use super::selection::{Content, ElementOrder, ExportSelection};
 use super::wires_list::write_list;
 use super::writers::{Writers, is_first};
 use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtk};
@@ -16,15 +16,15 @@ use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtk};
 /// Writes a mesh as one file, and what belongs to it; the tetrahedra of `.vtkhdf` as one of several `writers`, of whom the first does the rest.
 pub(super) fn write(
     format: MeshFormat,
-    selection: &Selection,
+    selection: &ExportSelection,
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
     writers: Option<&dyn Writers>,
 ) -> Result<FileCounts> {
     let midpoints = match selection.order {
-        Order::First => None,
-        Order::Second => Some(Midpoints::gather(mesh, format == MeshFormat::Gmsh)?),
+        ElementOrder::First => None,
+        ElementOrder::Second => Some(Midpoints::gather(mesh, format == MeshFormat::Gmsh)?),
     };
     let midpoints = midpoints.as_ref();
     let mut counts = FileCounts {
@@ -36,27 +36,29 @@ pub(super) fn write(
         MeshFormat::Vtu | MeshFormat::VtkHdf if selection.content != Content::Mesh => {
             mesh.expect_passes(1, 0);
             let is_hdf = format == MeshFormat::VtkHdf;
-            counts.vertices = vtk::write_boundary(mesh, draft, out, is_hdf, midpoints)?;
+            counts.vertices = vtk::write_boundary(mesh, outputs, out, is_hdf, midpoints)?;
             counts.tets = 0;
         }
-        MeshFormat::Vtu | MeshFormat::Pvtu => vtk::write(mesh, draft, out, false, midpoints, None)?,
+        MeshFormat::Vtu | MeshFormat::Pvtu => {
+            vtk::write(mesh, outputs, out, false, midpoints, None)?
+        }
         MeshFormat::VtkHdf => {
-            vtk::write(mesh, draft, out, true, midpoints, writers)?;
+            vtk::write(mesh, outputs, out, true, midpoints, writers)?;
             if !is_first(writers) {
                 return Ok(FileCounts::default());
             }
         }
-        MeshFormat::Medit => medit::write_text(mesh, draft, out)?,
-        MeshFormat::MeditBinary => medit::write_binary(mesh, draft, out)?,
-        MeshFormat::Gmsh => counts = gmsh::write(mesh, draft, out, (selection, midpoints))?,
-        MeshFormat::Gmsh22 => gmsh22::write(mesh, draft, out)?,
-        MeshFormat::Abaqus => abaqus::write(mesh, draft, out, midpoints)?,
-        MeshFormat::Numpy => npy_columns::write(mesh, draft, out)?,
+        MeshFormat::Medit => medit::write_text(mesh, outputs, out)?,
+        MeshFormat::MeditBinary => medit::write_binary(mesh, outputs, out)?,
+        MeshFormat::Gmsh => counts = gmsh::write(mesh, outputs, out, (selection, midpoints))?,
+        MeshFormat::Gmsh22 => gmsh22::write(mesh, outputs, out)?,
+        MeshFormat::Abaqus => abaqus::write(mesh, outputs, out, midpoints)?,
+        MeshFormat::Numpy => npy_columns::write(mesh, outputs, out)?,
         #[cfg(feature = "parquet")]
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),
-        MeshFormat::OpenFoam => counts = foam::write(mesh, draft, out, selection)?,
-        MeshFormat::Mfem => counts = mfem::write(mesh, draft, out, selection)?,
-        MeshFormat::TetGen => tetgen::write(mesh, draft, out)?,
+        MeshFormat::OpenFoam => counts = foam::write(mesh, outputs, out, selection)?,
+        MeshFormat::Mfem => counts = mfem::write(mesh, outputs, out, selection)?,
+        MeshFormat::TetGen => tetgen::write(mesh, outputs, out)?,
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }
     let has_lines = matches!(
@@ -69,7 +71,7 @@ pub(super) fn write(
             | MeshFormat::TetGen
     );
     if !has_lines && selection.content == Content::Mesh {
-        write_list(mesh, draft, out)?;
+        write_list(mesh, outputs, out)?;
     }
     mesh.report_end();
     Ok(counts)

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::error::Result;
-use super::stream::Records;
+use super::stream::RecordReader;
 use tetdb_base::storage::{Payload, sort_record};
 use tetdb_schema::record::SealedVertex;
 
@@ -38,21 +38,21 @@ pub(super) struct Doubles {
 
 /// Changes, read one tetrahedron after the other.
 pub(super) struct ChangeReader {
-    records: Records<Change>,
+    records: RecordReader<Change>,
     next: Option<Change>,
 }
 
 impl Doubles {
     /// The changes, from the first one on. Errors: the disk.
     pub fn changes(&self) -> Result<ChangeReader> {
-        let mut records = Records::open(&self.changes, 0)?;
+        let mut records = RecordReader::open(&self.changes, 0)?;
         Ok(ChangeReader { next: records.next()?, records })
     }
 
     /// Every double with its place among them. Errors: the disk, those of `each`.
     pub fn each(&self, mut each: impl FnMut(u64, &Double) -> Result<()>) -> Result<()> {
         let mut place = 0;
-        Records::open(&self.vertices, 0)?.each(|double| {
+        RecordReader::open(&self.vertices, 0)?.each(|double| {
             place += 1;
             each(place - 1, double)
         })

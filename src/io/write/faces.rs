@@ -8,7 +8,7 @@ use tetdb_schema::record::{InterfaceFace, NO_TET, SealedFacet};
 use super::error::Result;
 use super::numbering::PartNumbers;
 use super::scope::Scope;
-use super::stream::{Records, Stream, scratch};
+use super::stream::{RecordReader, Stream, scratch};
 use tetdb_base::storage::{Sorter, sort_record};
 
 /// Marks the key of an interface face, and sorts it behind the input triangles; below it the number of the cut, then of the face.
@@ -169,7 +169,7 @@ pub(super) struct BoundaryFaces {
 impl BoundaryFaces {
     /// Every face, input triangles first. Errors: the disk, and those of `each`.
     pub fn each(&self, each: impl FnMut(&BoundaryFace) -> Result<()>) -> Result<()> {
-        Records::open(&self.path, 0)?.each(each)
+        RecordReader::open(&self.path, 0)?.each(each)
     }
 
     /// The faces that `each` puts for these, at `path`. Errors: the disk, those of `each`.

@@ -5,10 +5,10 @@
 
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
 use super::names::quotable;
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 
 /// Gmsh's numbers of the types of elements.
@@ -20,7 +20,7 @@ const TETRAHEDRON: u32 = 4;
 const N_TAGS: u32 = 2;
 const N_TAGS_PARTITIONED: u32 = 4;
 
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     mesh.check_limits(out, i32::MAX as u64)?;
     mesh.expect_passes(1, 1);
     let elements_bytes = 24 * mesh.n_faces() + 28 * mesh.n_tets();
@@ -28,7 +28,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     let partitioned = if mesh.n_parts() > 1 { partition_bytes } else { 0 };
     let bytes = 200 + 28 * mesh.n_vertices() + elements_bytes + partitioned;
     let names = physical_names(mesh)?;
-    let path = draft.create(out, bytes + names.len() as u64)?;
+    let path = outputs.create(out, bytes + names.len() as u64)?;
     let mut stream = Stream::open(&path)?;
     stream.text("$MeshFormat\n2.2 1 8\n");
     put(&mut stream, &[1]);

@@ -31,14 +31,14 @@ impl Number {
 }
 
 /// A node of the file's tree.
-pub(super) struct Object {
+pub(super) struct Hdf5Object {
     name: &'static str,
-    attributes: Vec<Attribute>,
+    attributes: Vec<Hdf5Attribute>,
     content: Content,
 }
 
 /// A small value attached to an object.
-struct Attribute {
+struct Hdf5Attribute {
     name: &'static str,
     datatype: Vec<u8>,
     dataspace: Vec<u8>,
@@ -46,12 +46,12 @@ struct Attribute {
 }
 
 enum Content {
-    Group(Vec<Object>),
+    Group(Vec<Hdf5Object>),
     Array(Number, Vec<u64>),
 }
 
-impl Object {
-    pub fn group(name: &'static str, children: Vec<Object>) -> Self {
+impl Hdf5Object {
+    pub fn group(name: &'static str, children: Vec<Hdf5Object>) -> Self {
         let (attributes, content) = (Vec::new(), Content::Group(children));
         Self { name, attributes, content }
     }
@@ -64,7 +64,7 @@ impl Object {
 
     /// The same with a list of integers attached.
     pub fn with_integers(mut self, name: &'static str, values: &[i64]) -> Self {
-        self.attributes.push(Attribute {
+        self.attributes.push(Hdf5Attribute {
             name,
             datatype: Number::I64.datatype(),
             dataspace: dataspace(&[values.len() as u64]),
@@ -77,7 +77,7 @@ impl Object {
     pub fn with_text(mut self, name: &'static str, text: &str) -> Self {
         let mut datatype = vec![0x13, 0, 0, 0];
         datatype.extend((text.len() as u32).to_le_bytes());
-        self.attributes.push(Attribute {
+        self.attributes.push(Hdf5Attribute {
             name,
             datatype,
             dataspace: vec![2, 0, 0, 0],
@@ -94,7 +94,7 @@ fn dataspace(shape: &[u64]) -> Vec<u8> {
 }
 
 /// The beginning of the file, and where its arrays are.
-pub(super) struct Plan {
+pub(super) struct Hdf5Layout {
     pub head: Vec<u8>,
     /// First byte and length of each array, in the order of the tree.
     pub arrays: Vec<[u64; 2]>,
@@ -106,14 +106,15 @@ const SUPERBLOCK_BYTES: usize = 48;
 const UNDEFINED: u64 = u64::MAX;
 
 /// Lays out a file with this root.
-pub(super) fn plan(root: &Object) -> Plan {
+pub(super) fn plan(root: &Hdf5Object) -> Hdf5Layout {
     // Headers have the same length whatever the addresses in them: the first round measures them.
     let measured = round(root, 0).head.len() as u64;
     round(root, measured)
 }
 
-fn round(root: &Object, data: u64) -> Plan {
-    let mut plan = Plan { head: vec![0; SUPERBLOCK_BYTES], arrays: Vec::new(), file_bytes: data };
+fn round(root: &Hdf5Object, data: u64) -> Hdf5Layout {
+    let mut plan =
+        Hdf5Layout { head: vec![0; SUPERBLOCK_BYTES], arrays: Vec::new(), file_bytes: data };
     let root = put_object(root, &mut plan);
     let mut superblock = b"\x89HDF\r\n\x1a\n\x02\x08\x08\x00".to_vec();
     for address in [0, UNDEFINED, plan.file_bytes, root] {
@@ -125,7 +126,7 @@ fn round(root: &Object, data: u64) -> Plan {
 }
 
 /// Adds an object's header behind those of its children; returns its address.
-fn put_object(object: &Object, plan: &mut Plan) -> u64 {
+fn put_object(object: &Hdf5Object, plan: &mut Hdf5Layout) -> u64 {
     let mut messages = Vec::new();
     let mut message = |kind: u8, data: &[u8]| {
         messages.push(kind);
@@ -238,12 +239,12 @@ mod tests {
 
     #[test]
     fn arrays_follow_the_headers_and_do_not_overlap() {
-        let root = Object::group(
+        let root = Hdf5Object::group(
             "",
             vec![
-                Object::array("a", Number::U8, &[3]).with_text("kind", "x"),
-                Object::group("g", vec![Object::array("b", Number::F64, &[5, 3])]),
-                Object::array("c", Number::I64, &[0]),
+                Hdf5Object::array("a", Number::U8, &[3]).with_text("kind", "x"),
+                Hdf5Object::group("g", vec![Hdf5Object::array("b", Number::F64, &[5, 3])]),
+                Hdf5Object::array("c", Number::I64, &[0]),
             ],
         );
         let plan = plan(&root);

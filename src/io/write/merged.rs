@@ -15,7 +15,7 @@ use super::numbering::{
     Numbering, PartNumbers, Sharer, Source, Subset, shareable_vertices, sharers,
 };
 use super::scope::{FaceSet, Scope};
-use super::wires::{WrittenWires, beside};
+use super::wires::{WrittenEmbedded, beside};
 use tetdb_base::shape::excess_near;
 use tetdb_base::storage::{Sorted, check_cancelled};
 use tetdb_schema::catalog::SubdomainRow;
@@ -25,13 +25,13 @@ use tetdb_store::sealed::{FaceJoin, FaceJoinSorter, Shape, Subdomain};
 use tetdb_store::store::Catalog;
 
 /// Counts records and tells.
-pub(super) struct Progress<'a> {
+pub(super) struct ReadProgress<'a> {
     report: &'a dyn Fn(u64, u64),
     done: Cell<u64>,
     total: Cell<u64>,
 }
 
-impl<'a> Progress<'a> {
+impl<'a> ReadProgress<'a> {
     pub fn new(report: &'a dyn Fn(u64, u64)) -> Self {
         let (done, total) = (Cell::new(0), Cell::new(0));
         Self { report, done, total }
@@ -82,7 +82,7 @@ pub(super) struct Part {
 }
 
 /// A sub-domain being read, and its numbers in the merged mesh.
-pub(super) struct Opened {
+pub(super) struct OpenedPart {
     pub part: Subdomain,
     pub numbers: PartNumbers,
 }
@@ -97,13 +97,13 @@ pub(super) struct Merged<'a> {
     numbering: Numbering,
     faces: BoundaryFaces,
     doubles: Option<Doubles>,
-    wires: WrittenWires,
+    wires: WrittenEmbedded,
     support_first: u64,
     label_names: Vec<String>,
     region_names: Vec<String>,
     dir: PathBuf,
     memory: usize,
-    progress: Progress<'a>,
+    progress: ReadProgress<'a>,
     /// Sub-domains whose vertices and tetrahedra are read, by place.
     window: Range<usize>,
 }
@@ -117,7 +117,7 @@ impl<'a> Merged<'a> {
         scope: Scope,
         dir: &Path,
         memory: usize,
-        progress: Progress<'a>,
+        progress: ReadProgress<'a>,
     ) -> Result<Self> {
         let (label_names, region_names) = (store.labels()?, store.region_names()?);
         let row = store.wires()?;
@@ -125,7 +125,7 @@ impl<'a> Merged<'a> {
         let parts = sources(store, scope, dir, memory)?;
         let numbering = Numbering::new(store, &parts, scope.apart, dir, memory)?;
         let first_label = label_names.len() as u32;
-        let mut wires = WrittenWires::gather(store, &row, (&parts, &numbering), memory)?;
+        let mut wires = WrittenEmbedded::gather(store, &row, (&parts, &numbering), memory)?;
         let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
         let with_faces = scope.faces != FaceSet::Nothing;
         for (p, source) in parts.iter().enumerate().filter(|_| with_faces) {
@@ -145,7 +145,7 @@ impl<'a> Merged<'a> {
             numbering,
             faces,
             doubles: None,
-            wires: WrittenWires::default(),
+            wires: WrittenEmbedded::default(),
             support_first: row.fin_first,
             label_names,
             region_names,
@@ -166,7 +166,7 @@ impl<'a> Merged<'a> {
     }
 
     /// Embedded edges and points that are in it.
-    pub fn wires(&self) -> &WrittenWires {
+    pub fn wires(&self) -> &WrittenEmbedded {
         &self.wires
     }
 
@@ -206,9 +206,9 @@ impl<'a> Merged<'a> {
     }
 
     /// Sub-domain `p`, to be read as it is. Errors: damage, the disk.
-    pub fn open_part(&mut self, p: usize) -> Result<Opened> {
+    pub fn open_part(&mut self, p: usize) -> Result<OpenedPart> {
         let rank = self.parts[p].row.rank;
-        Ok(Opened {
+        Ok(OpenedPart {
             part: self.store.open_subdomain(rank, self.memory / 4)?,
             numbers: self.numbers_of(p)?,
         })

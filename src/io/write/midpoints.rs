@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use super::error::Result;
 use super::merged::Merged;
-use super::stream::{Records, scratch};
+use super::stream::{RecordReader, scratch};
 use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
 use tetdb_store::sealed::MergeReader;
 
@@ -117,18 +117,18 @@ impl Midpoints {
     }
 
     fn elements_from<const N: usize>(&self, first: u64) -> Result<ElementEdges<N>> {
-        Ok(ElementEdges { records: Records::open(&self.elements, first)?, first })
+        Ok(ElementEdges { records: RecordReader::open(&self.elements, first)?, first })
     }
 
     /// Positions of the midpoints, in the order of their numbers. Errors: the disk.
     pub fn points(&self) -> Result<MidpointReader> {
-        Ok(MidpointReader(Records::open(&self.points, 0)?))
+        Ok(MidpointReader(RecordReader::open(&self.points, 0)?))
     }
 }
 
 /// Numbers of the edges of elements that have `N`, read one element after the other.
 pub(super) struct ElementEdges<const N: usize> {
-    records: Records<[u8; 8]>,
+    records: RecordReader<[u8; 8]>,
     first: u64,
 }
 
@@ -151,7 +151,7 @@ impl<const N: usize> ElementEdges<N> {
 }
 
 /// Positions of midpoints in the order of their numbers.
-pub(super) struct MidpointReader(Records<Position>);
+pub(super) struct MidpointReader(RecordReader<Position>);
 
 impl MidpointReader {
     /// The midpoint of the edge with this number. Errors: the disk.

@@ -8,13 +8,12 @@
 //! and synced. Coordinates are never rounded.
 //!
 //! Reading order: [`export_with`] (what is written, in which format), `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh),
-//! `numbering` (shared vertices), `faces` (its boundary), `draft` and `stream` (files), then one file or folder per format.
+//! `numbering` (shared vertices), `faces` (its boundary), `output_files` and `stream` (files), then one file or folder per format.
 
 mod abaqus;
 mod columns;
 mod dispatch;
 mod doubles;
-mod draft;
 mod error;
 mod faces;
 mod foam;
@@ -30,6 +29,7 @@ mod names;
 mod npy;
 mod npy_columns;
 mod numbering;
+mod output_files;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod pieces;
@@ -62,12 +62,12 @@ pub use npy::bytes;
 pub use npy::{NpyField, NpyTable};
 pub use report::ExportReport;
 use report::FileCounts;
-pub use selection::{Content, Order, Selection, Share};
+pub use selection::{Content, ElementOrder, ExportSelection, Share};
 pub use surface::{SurfaceReport, surface, wires};
 pub use vtk::{SelectedTet, SelectedVtu, defects};
 
-use draft::{Draft, STDOUT};
-use merged::{Merged, Progress};
+use merged::{Merged, ReadProgress};
+use output_files::{OutputFiles, STDOUT};
 use scope::{FaceSet, Scope};
 use tetdb_base::storage::attempt;
 use tetdb_store::store::{Catalog, StoreError};
@@ -78,7 +78,7 @@ use writers::is_first;
 pub fn export(
     store: &mut Catalog,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
     memory_bytes: usize,
     report: &dyn Fn(u64, u64),
 ) -> Result<ExportReport> {
@@ -88,11 +88,11 @@ pub fn export(
 /// Writes what `selection` says of the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
 ///
 /// Holds about `memory_bytes`, and reports progress as (done, total) in records read. The files depend on the
-/// mesh alone. Where [`Selection::is_shared_file`] says so, several `writers` may each call this; files and counts are those of the first.
+/// mesh alone. Where [`ExportSelection::is_shared_file`] says so, several `writers` may each call this; files and counts are those of the first.
 /// Errors: [`WriteError`], also of others; no file of `out`'s name is touched before all are whole.
 pub fn export_with(
     store: &mut Catalog,
-    (out, selection): (&Path, &Selection),
+    (out, selection): (&Path, &ExportSelection),
     memory_bytes: usize,
     report: &dyn Fn(u64, u64),
     writers: Option<&dyn Writers>,
@@ -108,16 +108,16 @@ pub fn export_with(
             store.subdomain(rank)?;
         }
         check_regions(store, selection)?;
-        let mut draft = Draft::new(out)?;
+        let mut outputs = OutputFiles::new(out)?;
         let counts = match format {
-            MeshFormat::Topology => topology::write(store, &mut draft, out, memory_bytes)?,
+            MeshFormat::Topology => topology::write(store, &mut outputs, out, memory_bytes)?,
             #[cfg(feature = "parquet")]
             MeshFormat::Parquet => {
-                parquet::write(store, &mut draft, out, selection, memory_bytes, report)?
+                parquet::write(store, &mut outputs, out, selection, memory_bytes, report)?
             }
             _ if format == MeshFormat::Pvtu || selection.pieces && !format.numbers_globally() => {
                 let what = (format, selection);
-                pieces::write(store, &mut draft, out, what, memory_bytes, report)?
+                pieces::write(store, &mut outputs, out, what, memory_bytes, report)?
             }
             _ => {
                 let apart = format == MeshFormat::VtkHdf;
@@ -138,26 +138,26 @@ pub fn export_with(
                     },
                     apart,
                 };
-                let progress = Progress::new(report);
-                let dir = draft.dir().to_owned();
+                let progress = ReadProgress::new(report);
+                let dir = outputs.dir().to_owned();
                 let mut mesh = Merged::open(store, scope, &dir, memory_bytes, progress)?;
                 if selection.split_sheets {
-                    split::split(&mut mesh, &mut draft, out)?;
+                    split::split(&mut mesh, &mut outputs, out)?;
                 }
-                dispatch::write(format, selection, &mut mesh, &mut draft, out, writers)?
+                dispatch::write(format, selection, &mut mesh, &mut outputs, out, writers)?
             }
         };
         Ok(ExportReport {
             vertices: counts.vertices,
             tets: counts.tets,
             triangles: counts.triangles,
-            files: draft.publish()?,
+            files: outputs.publish()?,
         })
     })?
 }
 
 /// Refuses regions that the store does not have, or that are empty.
-fn check_regions(store: &mut Catalog, selection: &Selection) -> Result<()> {
+fn check_regions(store: &mut Catalog, selection: &ExportSelection) -> Result<()> {
     let rows = store.regions()?;
     let filled: Vec<u32> = (rows.iter().filter(|row| row.filled)).map(|row| row.region).collect();
     match (selection.regions.iter()).find(|region| !filled.contains(region)) {
@@ -167,7 +167,7 @@ fn check_regions(store: &mut Catalog, selection: &Selection) -> Result<()> {
 }
 
 /// The format of `out`, if it can hold what is selected.
-pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
+pub fn check(out: &Path, selection: &ExportSelection) -> Result<MeshFormat> {
     let path = || out.to_owned();
     let known = ENDINGS;
     let named = selection.format.or_else(|| MeshFormat::of_extension(out));
@@ -178,7 +178,7 @@ pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
     let asked = [
         (selection.content != Content::Mesh, FACES_ALONE),
         (selection.ascii, TEXT),
-        (selection.order == Order::Second, SECOND_ORDER),
+        (selection.order == ElementOrder::Second, SECOND_ORDER),
         (selection.ghosts, GHOSTS),
         (pieces || subdomains, SUBDOMAINS),
         (regions, REGIONS),

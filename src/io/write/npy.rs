@@ -5,8 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::draft::Draft;
 use super::error::Result;
+use super::output_files::OutputFiles;
 use super::stream::{Stream, Strip};
 
 /// Bytes of every head written here: a multiple of 64, as the format asks, with room for any number of rows.
@@ -40,7 +40,7 @@ pub struct NpyField {
 
 /// Rows of fields being written to one file; nothing has its name until [`NpyTable::finish`].
 pub struct NpyTable {
-    draft: Draft,
+    outputs: OutputFiles,
     path: PathBuf,
     kind: String,
     out: Stream,
@@ -50,8 +50,8 @@ pub struct NpyTable {
 impl NpyTable {
     /// Begins `out`. Errors: its folder cannot be written.
     pub fn new(out: &Path, fields: &[NpyField]) -> Result<Self> {
-        let mut draft = Draft::new(out)?;
-        let path = draft.create(out, HEAD_BYTES as u64)?;
+        let mut outputs = OutputFiles::new(out)?;
+        let path = outputs.create(out, HEAD_BYTES as u64)?;
         let fields: Vec<String> = fields
             .iter()
             .map(|f| match f.shape {
@@ -62,7 +62,7 @@ impl NpyTable {
         let kind = format!("[{}]", fields.join(", "));
         let mut stream = Stream::open(&path)?;
         stream.bytes(&head(&kind, 0, ""));
-        Ok(Self { draft, path, kind, out: stream, rows: 0 })
+        Ok(Self { outputs, path, kind, out: stream, rows: 0 })
     }
 
     /// Adds a row, its fields one after the other. Errors: the disk.
@@ -78,23 +78,23 @@ impl NpyTable {
         let mut strip = Strip::open(&self.path, 0, HEAD_BYTES as u64)?;
         strip.put(&head(&self.kind, self.rows, ""))?;
         strip.finish()?;
-        self.draft.publish_one()
+        self.outputs.publish_one()
     }
 }
 
 /// Lines of text being written to one file; nothing has its name until [`TextFile::finish`].
 pub struct TextFile {
-    draft: Draft,
+    outputs: OutputFiles,
     out: Stream,
 }
 
 impl TextFile {
     /// Begins `out`. Errors: its folder cannot be written.
     pub fn new(out: &Path) -> Result<Self> {
-        let mut draft = Draft::new(out)?;
-        let path = draft.create(out, 0)?;
+        let mut outputs = OutputFiles::new(out)?;
+        let path = outputs.create(out, 0)?;
         let out = Stream::open(&path)?;
-        Ok(Self { draft, out })
+        Ok(Self { outputs, out })
     }
 
     /// Adds a line. Errors: the disk.
@@ -107,16 +107,16 @@ impl TextFile {
     /// Gives the file its name; returns its length. Errors: the disk.
     pub fn finish(self) -> Result<u64> {
         self.out.finish()?;
-        self.draft.publish_one()
+        self.outputs.publish_one()
     }
 }
 
 /// Writes a whole file at once; returns its length. Errors: the disk.
 pub fn bytes(out: &Path, content: &[u8]) -> Result<u64> {
-    let mut draft = Draft::new(out)?;
-    let path = draft.create(out, content.len() as u64)?;
+    let mut outputs = OutputFiles::new(out)?;
+    let path = outputs.create(out, content.len() as u64)?;
     let mut stream = Stream::open(&path)?;
     stream.bytes(content);
     stream.finish()?;
-    draft.publish_one()
+    outputs.publish_one()
 }

@@ -5,11 +5,11 @@
 use std::path::{Path, PathBuf};
 
 use super::columns::{Column, column, put_row};
-use super::draft::Draft;
 use super::error::Result;
 use super::faces::BoundaryFace;
 use super::merged::{Measured, Merged, MergedTet};
 use super::npy::{HEAD_BYTES, head};
+use super::output_files::OutputFiles;
 use super::stream::Strip;
 use tetdb_schema::record::SealedVertex;
 
@@ -21,11 +21,16 @@ struct Arrays<T> {
 
 impl<T> Arrays<T> {
     /// Begins the files of `columns` beside `out`, their heads written. Errors: the disk.
-    fn create(draft: &mut Draft, out: &Path, rows: u64, columns: Vec<Column<T>>) -> Result<Self> {
+    fn create(
+        outputs: &mut OutputFiles,
+        out: &Path,
+        rows: u64,
+        columns: Vec<Column<T>>,
+    ) -> Result<Self> {
         let strip = |column: &Column<T>| {
             let length = rows * column.components * column.number.bytes();
             let file_bytes = HEAD_BYTES as u64 + length;
-            let path = draft.create(&array_path(out, column.name), file_bytes)?;
+            let path = outputs.create(&array_path(out, column.name), file_bytes)?;
             let inner = match column.components {
                 1 => String::new(),
                 n => format!(" {n}"),
@@ -69,14 +74,14 @@ where
     }
 }
 
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     mesh.expect_passes(1, 1);
     let n_vertices = mesh.n_vertices();
     let columns = vec![
         column("points", |vertex: &SealedVertex| vertex.point),
         column("vertex_id", |vertex: &SealedVertex| vertex.id as i64),
     ];
-    let mut arrays = Arrays::create(draft, out, n_vertices, columns)?;
+    let mut arrays = Arrays::create(outputs, out, n_vertices, columns)?;
     mesh.vertices(|_, vertex| arrays.row(vertex))?;
     arrays.finish()?;
 
@@ -87,7 +92,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         column("quality", |tet: &MergedTet| tet.quality),
         column("global_id", |tet: &MergedTet| tet.id.number() as i64),
     ];
-    let mut arrays = Arrays::create(draft, out, mesh.n_tets(), columns)?;
+    let mut arrays = Arrays::create(outputs, out, mesh.n_tets(), columns)?;
     mesh.measured_tets(Measured::Quality, |tet| arrays.row(tet))?;
     arrays.finish()?;
 
@@ -96,7 +101,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         column("label", |face: &BoundaryFace| face.label),
         column("input_id", |face: &BoundaryFace| face.triangle().map_or(-1, |t| t as i64)),
     ];
-    let mut arrays = Arrays::create(draft, out, mesh.n_faces(), columns)?;
+    let mut arrays = Arrays::create(outputs, out, mesh.n_faces(), columns)?;
     mesh.faces().each(|face| arrays.row(face))?;
     arrays.finish()
 }

@@ -17,9 +17,9 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
 use tetdb_schema::ids::TetId;
 
-use super::draft::Draft;
+use super::output_files::OutputFiles;
 use super::pieces::piece_path;
-use super::{FileCounts, Result, Selection, WriteError};
+use super::{ExportSelection, FileCounts, Result, WriteError};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::check_cancelled;
 use tetdb_store::sealed::{Shape, Subdomain};
@@ -55,8 +55,8 @@ fn failed(path: &Path, error: ParquetError) -> WriteError {
 }
 
 impl Table {
-    fn create(draft: &mut Draft, out: &Path, schema: &str, bytes: u64) -> Result<Self> {
-        let path = draft.create(out, bytes)?;
+    fn create(outputs: &mut OutputFiles, out: &Path, schema: &str, bytes: u64) -> Result<Self> {
+        let path = outputs.create(out, bytes)?;
         let file = OpenOptions::new().write(true).open(&path);
         let file = BufWriter::new(file.map_err(|e| WriteError::io(&path, e))?);
         let schema = Arc::new(parse_message_type(schema).expect("the schemas are well formed"));
@@ -102,9 +102,9 @@ fn column<T: DataType>(
 
 pub(super) fn write(
     store: &mut Catalog,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
     memory: usize,
     report: &dyn Fn(u64, u64),
 ) -> Result<FileCounts> {
@@ -115,7 +115,7 @@ pub(super) fn write(
     for row in rows {
         let mut part = store.open_subdomain(row.rank, memory / 2)?;
         let piece = piece_path(out, row.rank, "parquet");
-        let mut table = Table::create(draft, &piece, TETS, row.tets * 32)?;
+        let mut table = Table::create(outputs, &piece, TETS, row.tets * 32)?;
         let mut tets = Tets::default();
         for chunk in 0..row.chunks[0] {
             tets.add(&mut part, chunk)?;
@@ -130,7 +130,7 @@ pub(super) fn write(
         counts.vertices += row.vertices;
         let name = piece.file_stem().unwrap_or_default().to_string_lossy();
         let beside = piece.with_file_name(format!("{name}_vertices.parquet"));
-        let mut table = Table::create(draft, &beside, VERTICES, row.vertices * 24)?;
+        let mut table = Table::create(outputs, &beside, VERTICES, row.vertices * 24)?;
         vertices(&mut part, &mut table)?;
         table.finish()?;
     }

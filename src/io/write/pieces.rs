@@ -7,18 +7,18 @@ use std::path::{Path, PathBuf};
 
 use super::columns::Number;
 use super::dispatch;
-use super::draft::Draft;
-use super::merged::{Merged, Progress};
+use super::merged::{Merged, ReadProgress};
+use super::output_files::OutputFiles;
 use super::scope::{FaceSet, Scope};
 use super::stream::Stream;
-use super::{FileCounts, MeshFormat, Result, Selection, WriteError, vtk};
+use super::{ExportSelection, FileCounts, MeshFormat, Result, WriteError, vtk};
 use tetdb_store::store::Catalog;
 
 pub(super) fn write(
     store: &mut Catalog,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    (format, selection): (MeshFormat, &Selection),
+    (format, selection): (MeshFormat, &ExportSelection),
     memory: usize,
     report: &dyn Fn(u64, u64),
 ) -> Result<FileCounts> {
@@ -49,17 +49,17 @@ pub(super) fn write(
             faces: FaceSet::SkinAndInterfaces,
             apart: false,
         };
-        let dir = draft.dir().join(format!("piece-{}", row.rank));
+        let dir = outputs.dir().join(format!("piece-{}", row.rank));
         fs::create_dir(&dir).map_err(|e| WriteError::io(&dir, e))?;
         // A piece's records stand for its tetrahedra in the whole.
         let report_piece = |done: u64, total: u64| {
             let share = done as f64 / total.max(1) as f64;
             report(counts.tets + (share * row.tets as f64) as u64, all);
         };
-        let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&report_piece))?;
+        let mut mesh = Merged::open(store, scope, &dir, memory, ReadProgress::new(&report_piece))?;
         let is_empty = mesh.n_tets() == 0;
         let written = match is_written && !is_empty {
-            true => dispatch::write(format, selection, &mut mesh, draft, &piece, None)?,
+            true => dispatch::write(format, selection, &mut mesh, outputs, &piece, None)?,
             false => FileCounts::default(),
         };
         fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
@@ -69,7 +69,7 @@ pub(super) fn write(
         }
     }
     if names_all {
-        head(draft, out, &pieces)?;
+        head(outputs, out, &pieces)?;
     }
     Ok(counts)
 }
@@ -81,8 +81,8 @@ pub(super) fn piece_path(out: &Path, rank: u32, extension: &str) -> PathBuf {
 }
 
 /// The file that names the pieces. Arrays as in `vtu`. Source: the VTK file formats document, "Parallel file formats".
-fn head(draft: &mut Draft, out: &Path, pieces: &[PathBuf]) -> Result<()> {
-    let path = draft.create(out, 2000)?;
+fn head(outputs: &mut OutputFiles, out: &Path, pieces: &[PathBuf]) -> Result<()> {
+    let path = outputs.create(out, 2000)?;
     let mut stream = Stream::open(&path)?;
     stream.text(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \

@@ -6,7 +6,7 @@ use super::format::MeshFormat;
 
 /// What of a mesh is written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Selection {
+pub struct ExportSelection {
     /// Ranks of sub-domains; none stands for all. What bounds them towards others is boundary.
     pub subdomains: BTreeSet<u32>,
     /// Numbers of regions; none stands for all. What bounds them is boundary.
@@ -26,7 +26,7 @@ pub struct Selection {
     /// The vertices on sheets once for each side, and its triangles boundary of both.
     pub split_sheets: bool,
     /// Nodes of the elements.
-    pub order: Order,
+    pub order: ElementOrder,
 }
 
 /// The pieces of one of several processes, which together write all.
@@ -38,7 +38,7 @@ pub struct Share {
     pub of: u32,
 }
 
-impl Selection {
+impl ExportSelection {
     /// Whether this process writes the piece of a sub-domain.
     pub(super) fn writes_piece(&self, rank: u32) -> bool {
         let is_asked = self.subdomains.is_empty() || self.subdomains.contains(&rank);
@@ -56,7 +56,7 @@ impl Selection {
 
     /// Whether several processes can write the one file together: the tetrahedra of `.vtkhdf`, a partition for each sub-domain.
     pub fn is_shared_file(&self, format: MeshFormat) -> bool {
-        let is_plain = self.content == Content::Mesh && self.order == Order::First;
+        let is_plain = self.content == Content::Mesh && self.order == ElementOrder::First;
         format == MeshFormat::VtkHdf && is_plain && !self.pieces && !self.split_sheets
     }
 
@@ -68,7 +68,7 @@ impl Selection {
 
 /// Nodes of the elements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Order {
+pub enum ElementOrder {
     /// Corners.
     #[default]
     First,

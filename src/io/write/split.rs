@@ -7,14 +7,14 @@
 use std::path::Path;
 
 use super::doubles::{Change, Double, Doubles};
-use super::draft::Draft;
 use super::error::Result;
 use super::faces::BoundaryFace;
 use super::merged::Merged;
-use super::stream::{Records, Stream, save, scratch};
+use super::output_files::OutputFiles;
+use super::stream::{RecordReader, Stream, save, scratch};
 use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
 use tetdb_schema::record::FACES;
-use tetdb_store::sealed::MergeReader;
+use tetdb_store::sealed::{BitSet, MergeReader};
 
 sort_record! {
     /// A tetrahedron at a vertex of a sheet.
@@ -53,7 +53,7 @@ sort_record! {
 const NONE: u64 = u64::MAX;
 
 /// Splits the sheets of `mesh`, and lists the pairs in a file beside `out`. Errors: damage, the disk.
-pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+pub(super) fn split(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     let (corners, face_corners) = at_sheets(mesh)?;
     let dir = mesh.dir().to_owned();
     let n_vertices = mesh.n_vertices();
@@ -92,7 +92,7 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     let doubles = Doubles { n, changes: dir.join("changes"), vertices: dir.join("doubles") };
     save(changes.finish()?, &doubles.changes, |_| ())?;
     positions(mesh, &originals, &doubles.vertices)?;
-    pairs(&doubles, draft, out, n_vertices)?;
+    pairs(&doubles, outputs, out, n_vertices)?;
     split_faces(mesh, face_changes.finish()?)?;
     mesh.set_doubles(doubles);
     Ok(())
@@ -100,23 +100,22 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
 
 /// Tetrahedra and faces at vertices of sheets, by these. Memory: a bit for each vertex.
 fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<TetCorner>, Sorted<FaceCorner>)> {
-    let mut bits = vec![0u64; mesh.n_vertices().div_ceil(64) as usize];
+    let mut on_sheet = BitSet::new(mesh.n_vertices());
     mesh.faces().each(|face| {
         if is_sheet(face) {
             for v in face.vertices {
-                bits[(v / 64) as usize] |= 1 << (v % 64);
+                on_sheet.insert(v);
             }
         }
         Ok(())
     })?;
-    let on_sheet = |v: u64| bits[(v / 64) as usize] >> (v % 64) & 1 == 1;
     let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
     let mut face_corners = Sorter::new(&dir, bytes);
     let mut number = 0;
     mesh.faces().each(|face| {
         let mut vertices = face.vertices;
         vertices.sort_unstable();
-        for vertex in vertices.into_iter().filter(|&v| on_sheet(v)) {
+        for vertex in vertices.into_iter().filter(|&v| on_sheet.contains(v)) {
             face_corners.push(FaceCorner {
                 vertex,
                 face: number,
@@ -131,7 +130,7 @@ fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<TetCorner>, Sorted<FaceCorner>
     let mut corners = Sorter::new(&dir, bytes);
     let mut number = 0;
     mesh.tets(|tet| {
-        for vertex in tet.nodes.into_iter().filter(|&v| on_sheet(v)) {
+        for vertex in tet.nodes.into_iter().filter(|&v| on_sheet.contains(v)) {
             corners.push(TetCorner {
                 vertex,
                 tet: number,
@@ -215,7 +214,7 @@ fn face_change(face: &FaceCorner, tets: &[TetCorner], numbers: &[u64]) -> Option
 
 /// Writes the doubles with all that their vertices have.
 fn positions(mesh: &mut Merged, originals: &Path, to: &Path) -> Result<()> {
-    let mut originals = Records::open(originals, 0)?;
+    let mut originals = RecordReader::open(originals, 0)?;
     let mut next = originals.next()?;
     let mut stream = scratch(to)?;
     mesh.vertices(|number, vertex| {
@@ -236,10 +235,10 @@ fn positions(mesh: &mut Merged, originals: &Path, to: &Path) -> Result<()> {
 }
 
 /// `NAME_pairs.csv`: each double and the vertex it is of, counted from 0 in the order of the file.
-fn pairs(doubles: &Doubles, draft: &mut Draft, out: &Path, n_vertices: u64) -> Result<()> {
+fn pairs(doubles: &Doubles, outputs: &mut OutputFiles, out: &Path, n_vertices: u64) -> Result<()> {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
     let path = out.with_file_name(format!("{stem}_pairs.csv"));
-    let mut stream = Stream::open(&draft.create(&path, 20 * doubles.n)?)?;
+    let mut stream = Stream::open(&outputs.create(&path, 20 * doubles.n)?)?;
     stream.text("vertex,double\n");
     doubles.each(|place, double| {
         stream.integer(double.vertex, b',');

@@ -5,8 +5,8 @@ use std::io::{BufReader, BufWriter, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
-use super::draft::STDOUT;
 use super::error::{Result, WriteError};
+use super::output_files::STDOUT;
 use tetdb_base::storage::{SortBytes, SortRecord, Sorted};
 
 /// Bytes gathered before a write.
@@ -163,7 +163,7 @@ impl Strip {
 }
 
 /// Reads records from a scratch file.
-pub(super) struct Records<R> {
+pub(super) struct RecordReader<R> {
     path: PathBuf,
     file: BufReader<File>,
     /// Number of the next record.
@@ -171,7 +171,7 @@ pub(super) struct Records<R> {
     kind: PhantomData<R>,
 }
 
-impl<R: SortRecord> Records<R> {
+impl<R: SortRecord> RecordReader<R> {
     const BYTES: u64 = size_of::<R::Bytes>() as u64;
 
     /// Begins at record `first`. Errors: the disk.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::{Result, WriteError};
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 use tetdb_base::surface::{Surface, WireSet};
 
@@ -41,12 +41,12 @@ pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceReport> {
             });
         }
     };
-    let mut draft = Draft::new(out)?;
-    let path = draft.create(out, 0)?;
+    let mut outputs = OutputFiles::new(out)?;
+    let path = outputs.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
     write(surface, &mut stream)?;
     stream.finish()?;
-    let files = draft.publish()?;
+    let files = outputs.publish()?;
     Ok(SurfaceReport {
         bytes: files.iter().map(|f| f.1).sum(),
         labels_kept: labels || surface.label_names.len() <= 1,
@@ -168,8 +168,8 @@ fn obj(surface: &Surface, stream: &mut Stream) -> Result<()> {
 ///
 /// Errors: [`WriteError`]; `out` is not touched then.
 pub fn wires(set: &WireSet, out: &Path) -> Result<()> {
-    let mut draft = Draft::new(out)?;
-    let path = draft.create(out, 0)?;
+    let mut outputs = OutputFiles::new(out)?;
+    let path = outputs.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
     for p in &set.points {
         doubles(&mut stream, "v ", p.to_array());
@@ -191,7 +191,7 @@ pub fn wires(set: &WireSet, out: &Path) -> Result<()> {
         stream.end()?;
     }
     stream.finish()?;
-    draft.publish()?;
+    outputs.publish()?;
     Ok(())
 }
 

@@ -7,8 +7,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::draft::Draft;
 use super::numbering::{Source, shareable_vertices};
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 use super::{FileCounts, Result};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
@@ -41,18 +41,18 @@ sort_record! {
 
 pub(super) fn write(
     store: &mut Catalog,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
     memory: usize,
 ) -> Result<FileCounts> {
     let rows = store.subdomains()?;
     let sources: Vec<Source> = rows.iter().cloned().map(Source::from).collect();
-    let dir = draft.dir().to_owned();
+    let dir = outputs.dir().to_owned();
     let vertices = shared_vertices(store, &sources, &dir, memory)?;
     let faces = shared_faces(store, &rows, &dir, memory)?;
     let neighbors: BTreeMap<u32, Vec<NeighborRow>> =
         (store.topology()?.into_iter()).map(|row| (row.subdomain, row.neighbors)).collect();
-    let path = draft.create(out, 0)?;
+    let path = outputs.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
     stream.text("{\"schema\": 1, \"subdomains\": [");
     for (i, row) in rows.iter().enumerate() {

@@ -3,16 +3,16 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use tetdb_schema::catalog::WiresRow;
-use tetdb_schema::ids::{Owner, VertexId};
 
 use super::error::Result;
 use super::numbering::{Numbering, Source};
 use tetdb_base::storage::StorageError;
+use tetdb_store::sealed::input_index;
 use tetdb_store::store::Catalog;
 
 /// A point of the merged mesh.
 #[derive(Clone, Copy)]
-pub(super) struct WirePoint {
+pub(super) struct EmbeddedPoint {
     /// Number of its vertex.
     pub vertex: u64,
     pub label: u32,
@@ -36,14 +36,14 @@ pub(super) fn beside(row: &WiresRow, memory: usize) -> Result<usize> {
 
 /// What of the edges and points is in what is written.
 #[derive(Clone, Default)]
-pub(super) struct WrittenWires {
+pub(super) struct WrittenEmbedded {
     /// Numbers of the vertices of each edge, and its label, by which they are sorted.
     pub edges: Vec<([u64; 2], u32)>,
     /// By label.
-    pub points: Vec<WirePoint>,
+    pub points: Vec<EmbeddedPoint>,
 }
 
-impl WrittenWires {
+impl WrittenEmbedded {
     /// Those whose vertices are written. Errors: damage, the disk.
     pub fn gather(
         store: &mut Catalog,
@@ -60,12 +60,8 @@ impl WrittenWires {
             let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
             for (local, vertex) in (0u32..).zip(part.vertices()) {
                 let vertex = vertex?;
-                let Some(VertexId { owner: Owner::Surface, index }) =
-                    VertexId::from_number(vertex.id)
-                else {
-                    continue;
-                };
-                if let (true, Some(number)) = (wanted.contains(&index), numbers.vertex(local)) {
+                let index = input_index(vertex.id).filter(|index| wanted.contains(index));
+                if let (Some(index), Some(number)) = (index, numbers.vertex(local)) {
                     known.insert(index, (number, vertex.point));
                 }
             }
@@ -78,7 +74,7 @@ impl WrittenWires {
         let mut points: Vec<_> = (row.points.iter())
             .filter_map(|&[v, label]| {
                 let &(vertex, point) = known.get(&v)?;
-                Some(WirePoint { vertex, label, point })
+                Some(EmbeddedPoint { vertex, label, point })
             })
             .collect();
         points.sort_by_key(|point| point.label);

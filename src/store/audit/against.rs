@@ -1,6 +1,5 @@
 //! The mesh against its input: every triangle there, bit for bit, and nothing added on it.
 
-use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::{NO_TET, SealedFacet};
 
 use super::{Finding, Report};
@@ -40,13 +39,7 @@ fn get(bits: &[u64], at: usize) -> bool {
 
 /// The surface vertices of a facet's corners, where they are the input's.
 fn input_vertices(corners: &[Corner; 3]) -> [Option<u32>; 3] {
-    corners.each_ref().map(input_vertex)
-}
-
-/// The number in the input of a vertex that is of it.
-pub(super) fn input_vertex(corner: &Corner) -> Option<u32> {
-    let id = VertexId::from_number(corner.id)?;
-    (id.owner == Owner::Surface).then_some(id.index)
+    corners.each_ref().map(Corner::input_index)
 }
 
 /// Every vertex of a facet is the input's, whether the input is at hand or not.

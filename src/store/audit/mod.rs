@@ -54,7 +54,7 @@ pub fn verify(
     surface: Option<&Surface>,
     options: &VerifyOptions,
 ) -> Result<Report, StoreError> {
-    let scratch = Scratch::new(&options.temp_dir)?;
+    let scratch = VerifyScratch::new(&options.temp_dir)?;
     let mut audit = pass::Audit::new(surface, options, &scratch.path, None);
     for row in store.subdomains()? {
         audit.subdomain(&mut store.open_row(row, options.memory_bytes / 4)?)?;
@@ -77,7 +77,7 @@ pub fn verify_shared(
     options: &VerifyOptions,
     each: EachPart,
 ) -> Result<Report, StoreError> {
-    let scratch = Scratch::new(&options.temp_dir)?;
+    let scratch = VerifyScratch::new(&options.temp_dir)?;
     let rows = store.subdomains()?;
     let apex = apex(store, &rows, options);
     let mut audit = pass::Audit::new(surface, options, &scratch.path, apex);
@@ -100,7 +100,7 @@ pub fn verify_part(
     surface: Option<&Surface>,
     options: &VerifyOptions,
 ) -> Result<PartReport, StoreError> {
-    let scratch = Scratch::new(&options.temp_dir)?;
+    let scratch = VerifyScratch::new(&options.temp_dir)?;
     let mut audit = pass::Audit::new(surface, options, &scratch.path, apex);
     audit.subdomain(part)?;
     audit.into_part()
@@ -142,11 +142,11 @@ pub fn digest(store: &mut Catalog, memory_bytes: usize) -> Result<[Digest; 2], S
 }
 
 /// A folder that goes when it is dropped.
-struct Scratch {
+struct VerifyScratch {
     path: PathBuf,
 }
 
-impl Scratch {
+impl VerifyScratch {
     fn new(parent: &Path) -> Result<Self, StoreError> {
         use std::sync::atomic::{AtomicU32, Ordering};
         static NUMBER: AtomicU32 = AtomicU32::new(0);
@@ -157,7 +157,7 @@ impl Scratch {
     }
 }
 
-impl Drop for Scratch {
+impl Drop for VerifyScratch {
     fn drop(&mut self) {
         // Nothing depends on it; a folder that stays is only untidy.
         let _ = std::fs::remove_dir_all(&self.path);

@@ -12,16 +12,16 @@ pub struct PartReport {
     pub(super) digests: [[u64; 2]; 2],
     /// Region, tetrahedra, volume.
     pub(super) regions: Vec<(u32, u64, f64)>,
-    pub(super) volumes: Volumes,
+    pub(super) volumes: MeshVolumes,
     pub(super) interfaces: InterfaceSides,
     /// Where there is an input to compare with.
     pub(super) triangles: Option<SeenTriangles>,
     pub(super) wires: Option<SeenWires>,
 }
 
-/// Volumes of a sub-domain, or the sums of those of several.
+/// MeshVolumes of a sub-domain, or the sums of those of several.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug, Default)]
-pub(super) struct Volumes {
+pub(super) struct MeshVolumes {
     pub of_tets: f64,
     pub within_boundary: f64,
     /// Sum of the absolute values of what the volume within the boundary is made of.
@@ -30,7 +30,7 @@ pub(super) struct Volumes {
     pub rounding: f64,
 }
 
-impl Volumes {
+impl MeshVolumes {
     pub fn and(&self, next: &Self) -> Self {
         Self {
             of_tets: self.of_tets + next.of_tets,

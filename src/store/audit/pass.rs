@@ -10,11 +10,13 @@ use tetdb_schema::record::{FACES, NO_TET, SealedTet};
 use super::against::{Input, check_owners};
 use super::interface::InterfaceAudit;
 use super::pairing::{OpenSide, OpenSides};
-use super::part_report::{PartReport, Volumes};
+use super::part_report::{MeshVolumes, PartReport};
 use super::rows::{Rederived, RegionSums, check_regions};
 use super::wires::WireSearch;
 use super::{Finding, Level, Report, VerifyOptions};
-use crate::sealed::{Corner, FaceJoin, FaceJoinSorter, FacePairs, Paired, Subdomain, sorted_face};
+use crate::sealed::{
+    BitSet, Corner, FaceJoin, FaceJoinSorter, FacePairs, Paired, Subdomain, sorted_face,
+};
 use crate::store::StoreError;
 use tetdb_base::geom::{Point, insphere, orient};
 use tetdb_base::storage::{check_cancelled, parallel};
@@ -25,7 +27,7 @@ const FACET: u8 = 1;
 /// See [`FACET`].
 const INTERFACE: u8 = 2;
 
-/// Volumes that agree this well, relative to the sum of what was added, are the same: sums of
+/// MeshVolumes that agree this well, relative to the sum of what was added, are the same: sums of
 /// millions of terms lose some six of sixteen digits at most.
 const VOLUME_TOLERANCE: f64 = 1e-9;
 
@@ -40,13 +42,13 @@ pub(super) struct Audit<'a> {
     report: Report,
     digests: [Digest; 2],
     regions: RegionSums,
-    volumes: Volumes,
+    volumes: MeshVolumes,
     /// The first corner of the boundary: seen from near, cones do not cancel.
     apex: Option<Point>,
 }
 
 /// Two faces of a chunk that are one.
-struct Pair {
+struct FacePair {
     a: u32,
     b: u32,
 }
@@ -71,7 +73,7 @@ impl<'a> Audit<'a> {
             report,
             digests: [Digest::default(); 2],
             regions: RegionSums::new(),
-            volumes: Volumes::default(),
+            volumes: MeshVolumes::default(),
             apex,
         }
     }
@@ -97,7 +99,7 @@ impl<'a> Audit<'a> {
         report.vertices += row.vertices;
         report.facets += row.facets;
         report.interface_faces += row.interface_faces;
-        let mut used = vec![0u64; (row.vertices as usize).div_ceil(64)];
+        let mut used = BitSet::new(row.vertices);
         let mut claims = self.facets(part, &mut used)?;
         let digest = self.tets(part, &mut claims, &mut used)?;
         while let Some(claim) = claims.next_below(u32::MAX)? {
@@ -117,7 +119,7 @@ impl<'a> Audit<'a> {
     }
 
     /// Reads facets and interface faces; returns the faces that they name of tetrahedra.
-    fn facets(&mut self, part: &mut Subdomain, used: &mut [u64]) -> Result<FaceJoin, StoreError> {
+    fn facets(&mut self, part: &mut Subdomain, used: &mut BitSet) -> Result<FaceJoin, StoreError> {
         let rank = part.id().rank();
         let mut claims = FaceJoinSorter::new(self.scratch, self.options.memory_bytes as u64 / 8);
         let (chunks, total) = (part.row().chunks[2], part.row().facets);
@@ -127,7 +129,7 @@ impl<'a> Audit<'a> {
             for facet in part.facet_chunk(chunk)?.records {
                 n += 1;
                 let corners = part.corners(facet.vertices)?;
-                mark(used, &facet.vertices);
+                used.insert_all(facet.vertices);
                 for (side, tet) in facet.tets.into_iter().enumerate() {
                     if tet != NO_TET {
                         claims.push(tet, facet.vertices, side == 0, FACET.into())?;
@@ -183,7 +185,7 @@ impl<'a> Audit<'a> {
         &mut self,
         part: &mut Subdomain,
         claims: &mut FaceJoin,
-        used: &mut [u64],
+        used: &mut BitSet,
     ) -> Result<[Digest; 2], StoreError> {
         let rank = part.id().rank();
         let mut digest = [Digest::default(); 2];
@@ -204,7 +206,7 @@ impl<'a> Audit<'a> {
             let mut corners = Vec::with_capacity(tets.len());
             for (i, tet) in tets.iter().enumerate() {
                 let c = part.corners(tet.nodes)?;
-                mark(used, &tet.nodes);
+                used.insert_all(tet.nodes);
                 self.distinct(rank, chunk.first + i as u32, tet, &c);
                 if let Some(wires) = &mut self.wires {
                     wires.see(&c);
@@ -312,7 +314,7 @@ impl<'a> Audit<'a> {
                 let reference = (t * 4 + i) as u32;
                 match self.pairs.add(key, odd, reference) {
                     Paired::Open => {}
-                    Paired::With(other) => inner.push(Pair { a: other, b: reference }),
+                    Paired::With(other) => inner.push(FacePair { a: other, b: reference }),
                     Paired::Same(_) | Paired::Third => {
                         let c = face.map(|k| corners[t][k]);
                         self.crowded(rank, first + t as u32, &c);
@@ -437,9 +439,9 @@ impl<'a> Audit<'a> {
         Ok(())
     }
 
-    fn unused(&mut self, part: &mut Subdomain, used: &[u64]) -> Result<(), StoreError> {
+    fn unused(&mut self, part: &mut Subdomain, used: &BitSet) -> Result<(), StoreError> {
         for v in 0..part.row().vertices as u32 {
-            if used[v as usize / 64] >> (v % 64) & 1 == 0 {
+            if !used.contains(v.into()) {
                 let corner = part.corner(v)?;
                 let what = "no tetrahedron and no facet has the vertex";
                 let found = self.report.find(Finding::UnusedVertex, part.id().rank(), what);
@@ -527,10 +529,4 @@ fn counted(part: &Subdomain, what: &str, found: u64, total: u64) -> Result<(), S
     }
     let what = format!("its chunks hold {found} {what}, the catalog counts {total}");
     Err(part.damaged(what).into())
-}
-
-fn mark(used: &mut [u64], vertices: &[u32]) {
-    for &v in vertices {
-        used[v as usize / 64] |= 1 << (v % 64);
-    }
 }

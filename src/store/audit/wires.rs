@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 
-use super::against::input_vertex;
 use super::{Finding, Report};
 use crate::sealed::Corner;
 use tetdb_base::surface::Surface;
@@ -53,7 +52,7 @@ impl<'a> WireSearch<'a> {
     pub fn see(&mut self, corners: &[Corner; 4]) {
         let bits = |p: tetdb_base::geom::Point| p.to_array().map(f64::to_bits);
         let found = corners.each_ref().map(|corner| {
-            let v = input_vertex(corner)?;
+            let v = corner.input_index()?;
             let (_, is_seen) = self.vertices.get_mut(&v)?;
             let is_there = bits(self.surface.points[v as usize]) == bits(corner.point);
             *is_seen |= is_there;

@@ -12,7 +12,7 @@ use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedTet;
 
 use super::hit::Hit;
-use super::locate::{Candidate, Search, holds, leaders};
+use super::locate::{ChunkCandidate, Search, holds, leaders};
 use super::near::{Near, nearness};
 use super::session::{checked_chunk, vertex_chunk};
 use super::{QueryError, QuerySession};
@@ -92,7 +92,7 @@ impl QuerySession {
     /// Looks for the point in these chunks. Errors: damage.
     pub(super) fn search_lazily(
         &mut self,
-        candidates: &[Candidate],
+        candidates: &[ChunkCandidate],
         search: &mut Search,
     ) -> Result<(), QueryError> {
         let reaches = candidates.iter().map(|c| c.reach);
@@ -113,7 +113,7 @@ impl QuerySession {
     }
 
     /// Adds the tetrahedra of a chunk that may hold the point.
-    fn gather(&mut self, candidate: &Candidate, lazy: &mut Lazy) -> Result<(), QueryError> {
+    fn gather(&mut self, candidate: &ChunkCandidate, lazy: &mut Lazy) -> Result<(), QueryError> {
         check_cancelled();
         let part = &mut self.part(candidate.rank)?.subdomain;
         if !is_led_near(part, candidate, lazy)? {
@@ -189,7 +189,7 @@ impl QuerySession {
 /// Whether a vertex that leads tetrahedra of the chunk may be near enough; reads what chunks of vertices that takes, the nearest first.
 fn is_led_near(
     part: &mut Subdomain,
-    candidate: &Candidate,
+    candidate: &ChunkCandidate,
     lazy: &mut Lazy,
 ) -> Result<bool, StoreError> {
     if lazy.reach == f64::INFINITY {

@@ -28,7 +28,7 @@ pub struct Located {
 
 /// A chunk whose box holds the point.
 #[derive(Clone, Copy)]
-pub(super) struct Candidate {
+pub(super) struct ChunkCandidate {
     pub rank: u32,
     pub chunk: u32,
     resident: bool,
@@ -109,7 +109,7 @@ impl QuerySession {
         &mut self,
         point: Point,
         lazily: bool,
-        candidates: &mut Vec<Candidate>,
+        candidates: &mut Vec<ChunkCandidate>,
     ) -> Result<Search, QueryError> {
         let mut search = Search { point, best: None, settled: false };
         self.candidates(point, candidates)?;
@@ -127,7 +127,11 @@ impl QuerySession {
     }
 
     /// The chunks whose boxes hold a point, resident ones first, then the most promising.
-    fn candidates(&mut self, p: Point, candidates: &mut Vec<Candidate>) -> Result<(), QueryError> {
+    fn candidates(
+        &mut self,
+        p: Point,
+        candidates: &mut Vec<ChunkCandidate>,
+    ) -> Result<(), QueryError> {
         candidates.clear();
         let mut ranks = Vec::new();
         self.tree.visit(&|b| holds(b, p), &mut |i| {
@@ -144,7 +148,7 @@ impl QuerySession {
                 let reach = reach(&part.subdomain, chunk);
                 let nearness = leaders_nearness(&part.subdomain, chunk, p);
                 if nearness <= reach {
-                    candidates.push(Candidate {
+                    candidates.push(ChunkCandidate {
                         rank,
                         chunk: chunk as u32,
                         resident: false,

@@ -1,10 +1,11 @@
 //! What is asked for, and what of it follows from summaries.
 
 use tetdb_schema::chunk::TetSummary;
-use tetdb_schema::ids::{Owner, TetId};
+use tetdb_schema::ids::TetId;
 
 use super::hit::{EXCESS, Hit, ranges};
 use super::solid::Solid;
+use crate::sealed::input_index;
 use tetdb_base::expr::Expression;
 use tetdb_base::geom::{Aabb, Point};
 
@@ -112,8 +113,7 @@ impl Selection {
             true => s.holds(&tet.corners),
             false => s.meets(&tet.corners),
         };
-        let surface = Owner::Surface.number();
-        let is_input = |v: &u64| v >> 32 == u64::from(surface);
+        let is_input = |v: &u64| input_index(*v).is_some();
         self.solids.iter().all(solid)
             && (!self.touching_surface || tet.vertices.iter().any(is_input))
             && self.sharing.as_ref().is_none_or(|s| s.holds(tet.id, &tet.vertices))

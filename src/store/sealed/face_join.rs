@@ -8,7 +8,7 @@ use tetdb_schema::record::FACES;
 
 sort_record! {
     /// A face of a tetrahedron, with a mark of the caller's.
-    pub struct TetFace {
+    pub struct JoinedFace {
         /// Number of the tetrahedron.
         pub tet: u32,
         /// Ascending.
@@ -20,7 +20,7 @@ sort_record! {
     }
 }
 
-impl TetFace {
+impl JoinedFace {
     /// Returns which face of the tetrahedron with these nodes it is; none of them if it is seen from the other side.
     pub fn place(&self, nodes: [u32; 4]) -> Option<usize> {
         let own = (self.vertices, self.is_odd);
@@ -29,7 +29,7 @@ impl TetFace {
 }
 
 /// Faces being gathered for a [`FaceJoin`].
-pub struct FaceJoinSorter(Sorter<TetFace>);
+pub struct FaceJoinSorter(Sorter<JoinedFace>);
 
 impl FaceJoinSorter {
     /// A sorter of `memory_bytes` with scratch in `dir`.
@@ -46,7 +46,7 @@ impl FaceJoinSorter {
         mark: u32,
     ) -> Result<(), StorageError> {
         let (vertices, is_odd) = sorted_face(vertices);
-        self.0.push(TetFace { tet, vertices, is_odd: is_odd != is_turned, mark })
+        self.0.push(JoinedFace { tet, vertices, is_odd: is_odd != is_turned, mark })
     }
 
     /// Ends gathering. Errors: the disk.
@@ -56,11 +56,11 @@ impl FaceJoinSorter {
 }
 
 /// Faces in the order of their tetrahedra.
-pub struct FaceJoin(MergeReader<TetFace>);
+pub struct FaceJoin(MergeReader<JoinedFace>);
 
 impl FaceJoin {
     /// The next face of a tetrahedron below `end`. Errors: the disk.
-    pub fn next_below(&mut self, end: u32) -> Result<Option<TetFace>, StorageError> {
+    pub fn next_below(&mut self, end: u32) -> Result<Option<JoinedFace>, StorageError> {
         self.0.next_if(|face| face.tet < end)
     }
 

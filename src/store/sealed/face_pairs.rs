@@ -30,7 +30,7 @@ pub enum Paired {
 }
 
 #[derive(Clone, Copy)]
-struct Entry {
+struct FaceEntry {
     face: [u32; 3],
     /// `reference << 1 | parity`, or one of the two markers.
     reference: u32,
@@ -48,7 +48,7 @@ const NEAR: u32 = 16;
 /// Faces of near smallest vertices lie side by side: tetrahedra that come along a curve find them in the cache.
 /// Invariant: at most half full. Order: what it returns depends on the faces alone.
 pub struct FacePairs {
-    entries: Vec<Entry>,
+    entries: Vec<FaceEntry>,
     used: usize,
 }
 
@@ -56,7 +56,7 @@ impl FacePairs {
     /// A table for the faces of `tets` tetrahedra.
     pub fn new(tets: usize) -> Self {
         let slots = (tets * 8).next_power_of_two().max(16);
-        let vacant = Entry { face: [0; 3], reference: VACANT };
+        let vacant = FaceEntry { face: [0; 3], reference: VACANT };
         Self { entries: vec![vacant; slots], used: 0 }
     }
 
@@ -77,7 +77,7 @@ impl FacePairs {
         loop {
             let entry = &mut self.entries[at];
             if entry.reference == VACANT {
-                *entry = Entry { face, reference: reference << 1 | u32::from(odd) };
+                *entry = FaceEntry { face, reference: reference << 1 | u32::from(odd) };
                 self.used += 1;
                 assert!(self.used * 2 <= mask + 1, "the table is for fewer faces");
                 return Paired::Open;

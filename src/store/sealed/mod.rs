@@ -7,6 +7,7 @@
 #![warn(missing_docs)]
 
 mod batch;
+mod bit_set;
 mod coarse_snapshot;
 mod error;
 mod face_join;
@@ -19,9 +20,10 @@ mod totals;
 mod vertex_cache;
 mod writer;
 
+pub use bit_set::BitSet;
 pub use coarse_snapshot::{CoarseSnapshot, CoarseWriter};
 pub use error::SealedError;
-pub use face_join::{FaceJoin, FaceJoinSorter, TetFace};
+pub use face_join::{FaceJoin, FaceJoinSorter, JoinedFace};
 pub use face_pairs::{FacePairs, Paired, face_of, sorted_face};
 pub use form::Form;
 pub use merge_reader::MergeReader;
@@ -29,5 +31,5 @@ pub use shape::{Shape, quality_bin};
 pub use subdomain::{Chunk, Chunks, Subdomain};
 pub use totals::RegionTotals;
 pub use totals::Totals;
-pub use vertex_cache::{Corner, VertexCache};
+pub use vertex_cache::{Corner, VertexCache, input_index};
 pub use writer::{InterfaceSide, Sealed, SealedWriter};

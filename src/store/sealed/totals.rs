@@ -34,18 +34,18 @@ pub struct Totals {
     /// By number.
     pub regions: BTreeMap<u32, RegionTotals>,
     /// Of the piece at hand; kept, for memory that is asked for anew is cleared by the system each time.
-    corners: Vec<[Spot; 4]>,
+    corners: Vec<[VertexSum; 4]>,
     shapes: Vec<Shape>,
 }
 
 /// What is summed of a vertex.
 #[derive(Clone, Copy)]
-struct Spot {
+struct VertexSum {
     point: Point,
     mix: u64,
 }
 
-impl Spot {
+impl VertexSum {
     #[inline(always)]
     fn of(corner: &Corner) -> Self {
         Self { point: corner.point, mix: corner.mix }
@@ -159,7 +159,12 @@ impl Totals {
             corners.clear();
             for tet in piece {
                 let [a, b, c, d] = &corners_of(tet)?;
-                corners.push([Spot::of(a), Spot::of(b), Spot::of(c), Spot::of(d)]);
+                corners.push([
+                    VertexSum::of(a),
+                    VertexSum::of(b),
+                    VertexSum::of(c),
+                    VertexSum::of(d),
+                ]);
             }
             // Shapes in parallel, sums in order: the same for any number of threads.
             let known = self.cosines;

@@ -3,6 +3,7 @@
 use lru::LruCache;
 use tetdb_schema::chunk::{ChunkAddress, ChunkKind};
 use tetdb_schema::digest::vertex_mix;
+use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::SealedVertex;
 
 use super::Form;
@@ -30,9 +31,24 @@ pub struct Corner {
     pub h: f32,
 }
 
+impl Corner {
+    /// Its number among the vertices of the input; `None` for a vertex that is not the input's.
+    #[inline]
+    pub fn input_index(&self) -> Option<u32> {
+        input_index(self.id)
+    }
+}
+
+/// The number in the input of the vertex with this lasting id; `None` for a vertex that is not the input's.
+#[inline]
+pub fn input_index(id: u64) -> Option<u32> {
+    let id = VertexId::from_number(id)?;
+    (id.owner == Owner::Surface).then_some(id.index)
+}
+
 /// The vertices of a resident chunk.
 #[derive(Clone, Copy)]
-struct Window {
+struct ResidentChunk {
     chunk: u32,
     /// Vertices from this one on, below that.
     first: u32,
@@ -41,7 +57,7 @@ struct Window {
     place: u32,
 }
 
-impl Window {
+impl ResidentChunk {
     const EMPTY: Self = Self { chunk: NOT_RESIDENT, first: 0, end: 0, place: 0 };
 }
 
@@ -63,7 +79,7 @@ pub struct VertexCache {
     loader: Loader<SealedVertex>,
     scratch: Vec<SealedVertex>,
     /// Chunks asked last: corners of near tetrahedra lie in one or two.
-    last: [Window; 2],
+    last: [ResidentChunk; 2],
     bytes: usize,
     bytes_max: usize,
     loads: u64,
@@ -92,7 +108,7 @@ impl VertexCache {
             order: LruCache::unbounded(),
             loader: Loader::of(form, (subdomain, generation))?,
             scratch: Vec::new(),
-            last: [Window::EMPTY; 2],
+            last: [ResidentChunk::EMPTY; 2],
             bytes: 0,
             bytes_max,
             loads: 0,
@@ -115,7 +131,7 @@ impl VertexCache {
     #[inline(always)]
     pub fn corner(&mut self, file: &mut StoreFile, v: u32) -> Result<Corner, SealedError> {
         let [a, b] = &self.last;
-        let within = |w: &Window| w.first <= v && v < w.end;
+        let within = |w: &ResidentChunk| w.first <= v && v < w.end;
         let w = if within(a) {
             *a
         } else if within(b) {
@@ -131,7 +147,7 @@ impl VertexCache {
 
     /// The chunk of `v`, resident, in place of the one of the last two that was asked first.
     #[inline(never)]
-    fn turn_to(&mut self, file: &mut StoreFile, v: u32) -> Result<Window, SealedError> {
+    fn turn_to(&mut self, file: &mut StoreFile, v: u32) -> Result<ResidentChunk, SealedError> {
         if v >= self.n_vertices {
             return Err(self.no_such_vertex(file, v));
         }
@@ -140,7 +156,7 @@ impl VertexCache {
             self.load(file, chunk)?;
         }
         self.referenced[chunk] = true;
-        let window = Window {
+        let window = ResidentChunk {
             chunk: chunk as u32,
             first: self.firsts[chunk],
             end: self.firsts.get(chunk + 1).copied().unwrap_or(self.n_vertices),
@@ -219,7 +235,7 @@ impl VertexCache {
             // Whoever asks for it next has it read again.
             for window in &mut self.last {
                 if window.chunk == chunk {
-                    *window = Window::EMPTY;
+                    *window = ResidentChunk::EMPTY;
                 }
             }
             let place = std::mem::replace(&mut self.places[chunk as usize], NOT_RESIDENT);

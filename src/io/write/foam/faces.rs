@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use super::super::WriteError;
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
+use super::super::merged::{Merged, OpenedPart};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_schema::record::{FACES, NO_TET, SealedFacet};
 use tetdb_store::sealed::{MergeReader, Subdomain, sorted_face};
@@ -179,7 +179,7 @@ impl FaceWalk {
         let parts = mesh.parts();
         let mut sides = Sorter::new(mesh.dir(), mesh.sorter_bytes());
         for (p, row) in parts.iter().enumerate() {
-            let Opened { mut part, numbers } = mesh.open_part(p)?;
+            let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
             let mut patches = BTreeMap::new();
             for facet in part.facets() {
                 let facet = facet?;
@@ -246,7 +246,7 @@ impl FaceWalk {
     pub fn part(&mut self, mesh: &mut Merged, p: usize) -> Result<PartFaces> {
         let mut opened = mesh.open_part(p)?;
         let cells = cell_faces(mesh, &mut opened)?;
-        let Opened { mut part, numbers } = opened;
+        let OpenedPart { mut part, numbers } = opened;
         let (dir, bytes) = (mesh.dir(), mesh.sorter_bytes());
         let mut facets = MergeReader::new(facet_faces(mesh, &mut part)?);
         let mut lists = FaceLists {
@@ -320,7 +320,10 @@ impl FaceWalk {
 }
 
 /// The faces of all tetrahedra that are written.
-fn cell_faces(mesh: &Merged, Opened { part, numbers }: &mut Opened) -> Result<Sorted<CellFace>> {
+fn cell_faces(
+    mesh: &Merged,
+    OpenedPart { part, numbers }: &mut OpenedPart,
+) -> Result<Sorted<CellFace>> {
     let mut cells = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     for chunk in 0..part.tet_summaries().len() {
         let chunk = part.tet_chunk(chunk as u32)?;

@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use super::super::draft::Draft;
 use super::super::error::Result;
+use super::super::output_files::OutputFiles;
 use super::super::stream::Stream;
 
 /// A file being written.
@@ -17,13 +17,13 @@ pub(super) struct FoamFile {
 impl FoamFile {
     /// Begins `dir/object`, which will need `bytes`.
     pub fn create(
-        draft: &mut Draft,
+        outputs: &mut OutputFiles,
         (dir, object, class): (&Path, &str, &str),
         note: &str,
         ascii: bool,
         bytes: u64,
     ) -> Result<Self> {
-        let path = draft.create(&dir.join(object), bytes)?;
+        let path = outputs.create(&dir.join(object), bytes)?;
         let mut stream = Stream::open(&path)?;
         let format = if ascii { "ascii" } else { "binary" };
         let note = match note {

@@ -14,12 +14,12 @@ mod serial;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::{Result, WriteError};
 use super::merged::Merged;
 use super::names::set_names;
+use super::output_files::OutputFiles;
 use super::report::FileCounts;
-use super::selection::Selection;
+use super::selection::ExportSelection;
 use faces::FaceWalk;
 use polymesh::{Names, Size};
 
@@ -29,9 +29,9 @@ const SCRATCH_BYTES: u64 = 4 * 16 + 2 * 24;
 /// Writes the mesh into the case that `out`, an empty file for ParaView, stands in.
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
 ) -> Result<FileCounts> {
     // Every tetrahedron has fewer than four faces to itself, and labels have 31 bits.
     mesh.check_limits(out, i32::MAX as u64 / 4)?;
@@ -39,12 +39,12 @@ pub(super) fn write(
     let ascii = selection.ascii;
     let mut walk = FaceWalk::new(mesh)?;
     let names = names(mesh, &walk)?;
-    draft.create(out, needed_bytes(mesh, ascii))?;
+    outputs.create(out, needed_bytes(mesh, ascii))?;
     if selection.pieces {
         refuse_more_processors(&case, mesh.parts().len())?;
-        return processors::write(mesh, draft, &case, (&mut walk, &names), selection);
+        return processors::write(mesh, outputs, &case, (&mut walk, &names), selection);
     }
-    serial::write(mesh, draft, &case, (&mut walk, &names), ascii)
+    serial::write(mesh, outputs, &case, (&mut walk, &names), ascii)
 }
 
 /// About what all files need, and the sorted faces of the largest sub-domain beside them.

@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::super::draft::Draft;
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
+use super::super::merged::{Merged, OpenedPart};
+use super::super::output_files::OutputFiles;
 use super::super::report::FileCounts;
-use super::super::selection::Selection;
-use super::super::stream::{Records, scratch};
+use super::super::selection::ExportSelection;
+use super::super::stream::{RecordReader, scratch};
 use super::faces::{FaceWalk, PartFaces, zone_of};
 use super::file::FoamFile;
 use super::polymesh::{
-    FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary, write_labels,
+    FaceFiles, FoamPatch, Names, Size, Zones, mesh_dir, write_boundary, write_labels,
 };
 use super::serial::{WithTwoCells, in_order};
 use tetdb_base::storage::{Sorter, sort_record};
@@ -44,10 +44,10 @@ struct ProcessorFiles<'j> {
 /// Writes the processors that are selected; all are read, for numbers in the whole depend on those before.
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     case: &Path,
     (walk, names): (&mut FaceWalk, &Names),
-    selection: &Selection,
+    selection: &ExportSelection,
 ) -> Result<FileCounts> {
     mesh.expect_passes(0, 2);
     let ascii = selection.ascii;
@@ -69,9 +69,9 @@ pub(super) fn write(
         let is_written = selection.writes_piece(part.rank);
         let faces = walk.part(mesh, p)?;
         let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
-        job.faces(mesh, draft, walk, (p, faces, sizes), is_written, (&mut next, &mut addresses))?;
+        job.faces(mesh, outputs, walk, (p, faces, sizes), is_written, (&mut next, &mut addresses))?;
         if is_written {
-            job.points_and_cells(mesh, draft, p, sizes)?;
+            job.points_and_cells(mesh, outputs, p, sizes)?;
             counts.vertices += sizes.points;
             counts.tets += sizes.cells;
             counts.triangles += sizes.faces - sizes.inner;
@@ -88,8 +88,8 @@ pub(super) fn write(
         }
         let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
         let dir = job.dir(part.rank);
-        write_labels(draft, (&dir, "faceProcAddressing"), sizes.faces, ascii, |file| {
-            Records::open(&scratch_path(mesh.dir(), part.rank), 0)?
+        write_labels(outputs, (&dir, "faceProcAddressing"), sizes.faces, ascii, |file| {
+            RecordReader::open(&scratch_path(mesh.dir(), part.rank), 0)?
                 .each(|label| file.label(i32::from_le_bytes(*label)))?;
             of_part.into_iter().try_for_each(|address| {
                 let FaceAddress { rank, other, face, .. } = address?;
@@ -125,7 +125,7 @@ impl ProcessorFiles<'_> {
     fn faces(
         &mut self,
         mesh: &mut Merged,
-        draft: &mut Draft,
+        outputs: &mut OutputFiles,
         walk: &FaceWalk,
         (p, faces, size): (usize, PartFaces, Size),
         is_written: bool,
@@ -135,7 +135,7 @@ impl ProcessorFiles<'_> {
         let dir = self.dir(rank);
         let numbers = mesh.numbers_of(p)?;
         let mut files = match is_written {
-            true => Some(FaceFiles::create(draft, &dir, size, self.ascii)?),
+            true => Some(FaceFiles::create(outputs, &dir, size, self.ascii)?),
             false => None,
         };
         let mut known = scratch(&scratch_path(mesh.dir(), rank))?;
@@ -198,14 +198,14 @@ impl ProcessorFiles<'_> {
         }
         mesh.expect_count("faces", size.faces, files.written())?;
         files.finish()?;
-        zones.write(draft, &dir, &self.names.face_zones, self.ascii)?;
-        self.boundary(mesh, draft, walk, p, size)
+        zones.write(outputs, &dir, &self.names.face_zones, self.ascii)?;
+        self.boundary(mesh, outputs, walk, p, size)
     }
 
     fn boundary(
         &self,
         mesh: &Merged,
-        draft: &mut Draft,
+        outputs: &mut OutputFiles,
         walk: &FaceWalk,
         p: usize,
         size: Size,
@@ -213,20 +213,20 @@ impl ProcessorFiles<'_> {
         let here = mesh.parts()[p].rank;
         let dir = self.dir(here);
         let counts = &walk.census.patches[p];
-        let plain = self.names.patches.iter().map(|(label, name)| Patch {
+        let plain = self.names.patches.iter().map(|(label, name)| FoamPatch {
             name: name.clone(),
             between: None,
             n_faces: counts.get(label).copied().unwrap_or_default(),
         });
-        let shared = walk.census.between[p].iter().map(|(&there, &n_faces)| Patch {
+        let shared = walk.census.between[p].iter().map(|(&there, &n_faces)| FoamPatch {
             name: format!("procBoundary{here}to{there}"),
             between: Some([here as usize, there as usize]),
             n_faces,
         });
         let patches: Vec<_> = plain.chain(shared).collect();
-        write_boundary(draft, &dir, size.inner, &patches)?;
+        write_boundary(outputs, &dir, size.inner, &patches)?;
         let what = (dir.as_path(), "boundaryProcAddressing");
-        write_labels(draft, what, patches.len() as u64, self.ascii, |file| {
+        write_labels(outputs, what, patches.len() as u64, self.ascii, |file| {
             (0..).zip(&patches).try_for_each(|(number, patch)| {
                 file.label(if patch.between.is_some() { -1 } else { number })
             })
@@ -237,16 +237,16 @@ impl ProcessorFiles<'_> {
     fn points_and_cells(
         &self,
         mesh: &mut Merged,
-        draft: &mut Draft,
+        outputs: &mut OutputFiles,
         p: usize,
         size: Size,
     ) -> Result<()> {
         let (scratch, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
-        let Opened { mut part, numbers } = mesh.open_part(p)?;
+        let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
         let first_tet = numbers.first_tet as u32;
         let (dir, ascii) = (self.dir(part.id().rank()), self.ascii);
         let what = (dir.as_path(), "points", "vectorField");
-        let mut points = FoamFile::create(draft, what, "", ascii, 24 * size.points)?;
+        let mut points = FoamFile::create(outputs, what, "", ascii, 24 * size.points)?;
         points.list(size.points, |file| {
             for vertex in part.vertices() {
                 file.point(vertex?.point)?;
@@ -254,10 +254,10 @@ impl ProcessorFiles<'_> {
             Ok(())
         })?;
         points.finish()?;
-        write_labels(draft, (&dir, "pointProcAddressing"), size.points, ascii, |file| {
+        write_labels(outputs, (&dir, "pointProcAddressing"), size.points, ascii, |file| {
             (0..size.points as u32).try_for_each(|v| file.label(numbers.of([v])?[0] as i32))
         })?;
-        write_labels(draft, (&dir, "cellProcAddressing"), size.cells, ascii, |file| {
+        write_labels(outputs, (&dir, "cellProcAddressing"), size.cells, ascii, |file| {
             (0..size.cells as u32).try_for_each(|cell| file.label((first_tet + cell) as i32))
         })?;
         let mut zones = Zones::new(&scratch, false, bytes);
@@ -266,6 +266,6 @@ impl ProcessorFiles<'_> {
             zones.push(tet.region, id.local(), false)?;
         }
         mesh.advance(size.cells as usize);
-        zones.write(draft, &dir, &self.names.cell_zones, ascii)
+        zones.write(outputs, &dir, &self.names.cell_zones, ascii)
     }
 }

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::super::draft::Draft;
 use super::super::error::Result;
 use super::super::merged::Merged;
+use super::super::output_files::OutputFiles;
 use super::super::report::FileCounts;
 use super::faces::{FaceWalk, InnerFace, UpperFace, zone_of};
 use super::file::FoamFile;
-use super::polymesh::{FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary};
+use super::polymesh::{FaceFiles, FoamPatch, Names, Size, Zones, mesh_dir, write_boundary};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_store::sealed::MergeReader;
 
@@ -48,7 +48,7 @@ pub(super) fn in_order(
 
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     case: &Path,
     (walk, names): (&mut FaceWalk, &Names),
     ascii: bool,
@@ -64,33 +64,33 @@ pub(super) fn write(
     let inner = n_inner + n_between / 2;
     let size =
         Size { points: mesh.n_vertices(), cells: mesh.n_tets(), inner, faces: inner + n_outer };
-    write_points(mesh, draft, &dir, size, ascii)?;
-    let patches = names.patches.iter().map(|(label, name)| Patch {
+    write_points(mesh, outputs, &dir, size, ascii)?;
+    let patches = names.patches.iter().map(|(label, name)| FoamPatch {
         name: name.clone(),
         between: None,
         n_faces: (census.patches.iter().filter_map(|p| p.get(label))).sum(),
     });
-    write_boundary(draft, &dir, inner, &patches.collect::<Vec<_>>())?;
-    write_faces(mesh, draft, &dir, size, (walk, names), ascii)?;
+    write_boundary(outputs, &dir, inner, &patches.collect::<Vec<_>>())?;
+    write_faces(mesh, outputs, &dir, size, (walk, names), ascii)?;
     let mut zones = Zones::new(mesh.dir(), false, mesh.sorter_bytes());
     let mut cell = 0;
     mesh.tets(|tet| {
         cell += 1;
         zones.push(tet.region, cell - 1, false)
     })?;
-    zones.write(draft, &dir, &names.cell_zones, ascii)?;
+    zones.write(outputs, &dir, &names.cell_zones, ascii)?;
     Ok(FileCounts { vertices: size.points, tets: size.cells, triangles: n_outer })
 }
 
 fn write_points(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     dir: &Path,
     size: Size,
     ascii: bool,
 ) -> Result<()> {
     let what = (dir, "points", "vectorField");
-    let mut points = FoamFile::create(draft, what, "", ascii, 24 * size.points)?;
+    let mut points = FoamFile::create(outputs, what, "", ascii, 24 * size.points)?;
     points.begin_list(size.points);
     mesh.vertices(|_, vertex| points.point(vertex.point))?;
     points.end_list(size.points);
@@ -99,13 +99,13 @@ fn write_points(
 
 fn write_faces(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     dir: &Path,
     size: Size,
     (walk, names): (&mut FaceWalk, &Names),
     ascii: bool,
 ) -> Result<()> {
-    let mut files = FaceFiles::create(draft, dir, size, ascii)?;
+    let mut files = FaceFiles::create(outputs, dir, size, ascii)?;
     let bytes = mesh.sorter_bytes() / 4;
     let mut outer = Sorter::new(mesh.dir(), bytes);
     let mut zones = Zones::new(mesh.dir(), true, bytes);
@@ -143,5 +143,5 @@ fn write_faces(
     }
     mesh.expect_count("faces", size.faces, files.written())?;
     files.finish()?;
-    zones.write(draft, dir, &names.face_zones, ascii)
+    zones.write(outputs, dir, &names.face_zones, ascii)
 }

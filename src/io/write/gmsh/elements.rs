@@ -1,12 +1,12 @@
 //! Triangles and tetrahedra, entity by entity.
 
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
+use super::super::merged::{Merged, OpenedPart};
 use super::super::midpoints::{ElementEdges, Midpoints};
-use super::super::wires::WrittenWires;
+use super::super::wires::WrittenEmbedded;
 use super::entities::Entities;
 use super::out::Out;
-use super::piece::Piece;
+use super::piece::GmshPiece;
 use tetdb_base::storage::{Sorter, sort_record};
 
 /// Gmsh's numbers of the types of elements, of first and of second order.
@@ -53,7 +53,7 @@ struct Elements<'a> {
 pub(super) fn write(
     mesh: &mut Merged,
     out: &mut Out,
-    piece: &Piece,
+    piece: &GmshPiece,
     entities: &Entities,
 ) -> Result<()> {
     let n_faces = mesh.n_faces();
@@ -78,7 +78,7 @@ pub(super) fn write(
     };
     triangles(mesh, &mut elements, piece, entities)?;
     for &p in piece.which {
-        let Opened { mut part, numbers } = mesh.open_part(p)?;
+        let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
         let rank = part.id().rank();
         if let Some(entity) = entities.only_volume(rank) {
             for tet in part.tets() {
@@ -128,8 +128,8 @@ pub(super) fn write(
 fn lines(
     mesh: &Merged,
     out: &mut Out,
-    piece: &Piece,
-    (wires, n_before): (&WrittenWires, u64),
+    piece: &GmshPiece,
+    (wires, n_before): (&WrittenEmbedded, u64),
 ) -> Result<()> {
     let mut midpoints = piece.midpoints.map(Midpoints::lines).transpose()?;
     let mut edges = (n_before + 1..).zip(&wires.edges);
@@ -179,7 +179,7 @@ impl Elements<'_> {
 fn triangles(
     mesh: &Merged,
     elements: &mut Elements,
-    piece: &Piece,
+    piece: &GmshPiece,
     entities: &Entities,
 ) -> Result<()> {
     let mut sorter = Sorter::new(mesh.dir(), mesh.sorter_bytes());

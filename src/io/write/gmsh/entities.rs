@@ -6,9 +6,9 @@ use super::super::error::Result;
 use super::super::faces::BoundaryFace;
 use super::super::merged::Merged;
 use super::super::names::quotable;
-use super::super::wires::WrittenWires;
+use super::super::wires::WrittenEmbedded;
 use super::out::Out;
-use super::piece::Piece;
+use super::piece::GmshPiece;
 
 /// The least and the greatest coordinates.
 type Bounds = [[f64; 3]; 2];
@@ -27,12 +27,12 @@ pub(super) struct Entities {
     ranks: Vec<u32>,
     n_labels: u32,
     /// Edges are in a curve for each label, each point is an entity of its own, numbered from 1. None in a file of one partition.
-    pub wires: WrittenWires,
+    pub wires: WrittenEmbedded,
 }
 
 impl Entities {
     /// Counts those of a file. Errors: damage, the disk.
-    pub fn gather(mesh: &mut Merged, piece: &Piece) -> Result<Self> {
+    pub fn gather(mesh: &mut Merged, piece: &GmshPiece) -> Result<Self> {
         let parts = mesh.parts();
         let mut entities = Self {
             surfaces: Vec::new(),
@@ -40,7 +40,7 @@ impl Entities {
             bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             ranks: parts.iter().map(|part| part.rank).collect(),
             n_labels: mesh.n_labels(),
-            wires: WrittenWires::default(),
+            wires: WrittenEmbedded::default(),
         };
         if piece.which.len() == parts.len() {
             entities.wires = mesh.wires().clone();

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
-use super::super::stream::{Records, save};
+use super::super::merged::{Merged, OpenedPart};
+use super::super::stream::{RecordReader, save};
 use super::out::Out;
 use tetdb_base::storage::{Payload, Sorter, sort_record};
 use tetdb_store::sealed::MergeReader;
@@ -39,7 +39,7 @@ impl Ghosts {
         for p in 0..mesh.n_parts() {
             // Vertices of this sub-domain by number, ascending, and who else has them; places among all.
             let mut shared: Vec<(u64, u32)> = Vec::new();
-            let Opened { mut part, numbers } = mesh.open_part(p)?;
+            let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
             while let Some(sharer) = sharers.next_if(|s| s.part as usize == p)? {
                 shared.push((numbers.of_dense(sharer.local), sharer.other));
             }
@@ -95,7 +95,7 @@ impl Ghosts {
     /// Those that the partition at place `p` sees, by region and partition. Errors: the disk, those of `each`.
     pub fn each(&self, p: usize, each: impl FnMut(&Ghost) -> Result<()>) -> Result<()> {
         let n = self.firsts[p + 1] - self.firsts[p];
-        Records::open(&self.path, self.firsts[p])?.each_of(n, each)
+        RecordReader::open(&self.path, self.firsts[p])?.each_of(n, each)
     }
 
     /// Lists those that the partitions at places `which` see: element, its partition, the one that sees it.

@@ -14,23 +14,23 @@ mod piece;
 
 use std::path::{Path, PathBuf};
 
-use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
 use super::midpoints::Midpoints;
+use super::output_files::OutputFiles;
 use super::report::FileCounts;
-use super::selection::Selection;
+use super::selection::ExportSelection;
 use entities::Entities;
 use ghosts::Ghosts;
 use out::Out;
-use piece::Piece;
+use piece::GmshPiece;
 
 /// Writes one file of all, or one of each partition.
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    (selection, midpoints): (&Selection, Option<&Midpoints>),
+    (selection, midpoints): (&ExportSelection, Option<&Midpoints>),
 ) -> Result<FileCounts> {
     mesh.expect_passes(1, 1);
     let ghosts = match selection.ghosts {
@@ -41,15 +41,15 @@ pub(super) fn write(
     let foreign = ghosts.filter(|_| selection.pieces);
     if !selection.pieces {
         let all: Vec<usize> = (0..mesh.n_parts()).collect();
-        let piece = Piece { which: &all, midpoints, foreign };
-        return write_file(mesh, draft, out, &piece, (selection.ascii, ghosts));
+        let piece = GmshPiece { which: &all, midpoints, foreign };
+        return write_file(mesh, outputs, out, &piece, (selection.ascii, ghosts));
     }
     let mut counts = FileCounts::default();
     for (p, part) in mesh.parts().into_iter().enumerate() {
         if selection.writes_piece(part.rank) {
             let path = piece_path(out, part.rank);
-            let piece = Piece { which: &[p], midpoints, foreign };
-            counts += write_file(mesh, draft, &path, &piece, (selection.ascii, ghosts))?;
+            let piece = GmshPiece { which: &[p], midpoints, foreign };
+            counts += write_file(mesh, outputs, &path, &piece, (selection.ascii, ghosts))?;
         }
     }
     Ok(counts)
@@ -64,9 +64,9 @@ fn piece_path(out: &Path, rank: u32) -> PathBuf {
 
 fn write_file(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     path: &Path,
-    piece: &Piece,
+    piece: &GmshPiece,
     (ascii, ghosts): (bool, Option<&Ghosts>),
 ) -> Result<FileCounts> {
     let entities = Entities::gather(mesh, piece)?;
@@ -75,7 +75,7 @@ fn write_file(
     let [vertex_bytes, number_bytes] = if ascii { [55, 6] } else { [32, 8] };
     let numbers = if piece.midpoints.is_some() { 11 } else { 5 };
     let elements_bytes = number_bytes * numbers * (n_tets + entities.n_faces());
-    let file = draft.create(path, 1000 + vertex_bytes * nodes.n + elements_bytes)?;
+    let file = outputs.create(path, 1000 + vertex_bytes * nodes.n + elements_bytes)?;
     let mut out = Out::open(&file, ascii)?;
     out.section("MeshFormat", |out| {
         out.text(if ascii { "4.1 0 8\n" } else { "4.1 1 8\n" });

@@ -3,17 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
+use super::super::merged::{Merged, OpenedPart};
 use super::super::midpoints::{MidpointReader, Midpoints};
-use super::super::stream::{Records, save};
+use super::super::stream::{RecordReader, save};
 use super::entities::Entities;
 use super::out::Out;
-use super::piece::Piece;
+use super::piece::GmshPiece;
 use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
+use tetdb_store::sealed::BitSet;
 
 sort_record! {
     /// An entity that a vertex is on, or, behind all of these, where it is.
-    struct Claim {
+    struct VertexEntity {
         vertex: u64,
         /// [`POSITION`] for a position.
         entity: u32,
@@ -23,7 +24,7 @@ sort_record! {
 
 sort_record! {
     /// A vertex by its entity.
-    struct Node {
+    struct EntityNode {
         entity: u32,
         vertex: u64,
         point: Payload<[f64; 3]>,
@@ -41,36 +42,28 @@ pub(super) struct Nodes {
     path: PathBuf,
 }
 
-/// Numbers that were seen, of a range; those outside are always new.
-struct Seen {
+/// Numbers of a range that were met; numbers outside the range are always new.
+struct MetNumbers {
     first: u64,
-    bits: Vec<u64>,
+    n: u64,
+    met: BitSet,
 }
 
-impl Seen {
+impl MetNumbers {
     fn new(first: u64, n: u64) -> Self {
-        let bits = vec![0; n.div_ceil(64) as usize];
-        Self { first, bits }
+        Self { first, n, met: BitSet::new(n) }
     }
 
     fn is_new(&mut self, number: u64) -> bool {
-        let Some(place) = number.checked_sub(self.first) else {
-            return true;
-        };
-        let (word, bit) = ((place / 64) as usize, 1 << (place % 64));
-        let Some(word) = self.bits.get_mut(word) else {
-            return true;
-        };
-        let is_new = *word & bit == 0;
-        *word |= bit;
-        is_new
+        let place = number.checked_sub(self.first).filter(|&place| place < self.n);
+        place.is_none_or(|place| self.met.insert(place))
     }
 }
 
 /// Gives each vertex of a file, and each middle of an edge, its entity.
 pub(super) fn gather(
     mesh: &mut Merged,
-    piece: &Piece,
+    piece: &GmshPiece,
     entities: &Entities,
     name: &Path,
 ) -> Result<Nodes> {
@@ -83,12 +76,16 @@ pub(super) fn gather(
 }
 
 /// What faces, tetrahedra and ghosts of the piece say of their vertices and midpoints, by vertex.
-fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorted<Claim>> {
+fn claims(
+    mesh: &mut Merged,
+    piece: &GmshPiece,
+    entities: &Entities,
+) -> Result<Sorted<VertexEntity>> {
     let parts = mesh.parts();
     let n_vertices = mesh.n_vertices();
     let mut claims = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     let mut claim =
-        |vertex, entity, point| claims.push(Claim { vertex, entity, point: Payload(point) });
+        |vertex, entity, point| claims.push(VertexEntity { vertex, entity, point: Payload(point) });
     let mut edges = piece.midpoints.map(Midpoints::faces).transpose()?;
     let mut number = 0;
     mesh.faces().each(|face| {
@@ -107,13 +104,13 @@ fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorte
     })?;
     let mut edges = piece.midpoints.map(Midpoints::tets).transpose()?;
     for &p in piece.which {
-        let Opened { mut part, numbers } = mesh.open_part(p)?;
+        let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
         let rank = parts[p].rank;
         let only = entities.only_volume(rank);
         // Inside, all tetrahedra around a vertex are of one region, so that the first one tells it.
-        let mut vertices = Seen::new(parts[p].first_vertex, parts[p].n_vertices);
+        let mut vertices = MetNumbers::new(parts[p].first_vertex, parts[p].n_vertices);
         let of_edges = piece.midpoints.map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
-        let mut midpoints = Seen::new(n_vertices + of_edges.0, of_edges.1);
+        let mut midpoints = MetNumbers::new(n_vertices + of_edges.0, of_edges.1);
         let needs_tets = only.is_none() || edges.is_some();
         for tet in part.tets().take_while(|_| needs_tets) {
             let (id, tet) = tet?;
@@ -164,18 +161,18 @@ fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorte
 
 /// The first claim of each vertex, which is the strongest, with its position; by entity.
 fn granted(
-    claims: Sorted<Claim>,
+    claims: Sorted<VertexEntity>,
     n_vertices: u64,
     points: &mut Option<MidpointReader>,
-    mut sorter: Sorter<Node>,
-) -> Result<Sorted<Node>> {
+    mut sorter: Sorter<EntityNode>,
+) -> Result<Sorted<EntityNode>> {
     let mut last = None;
     for claim in claims {
         let claim = claim?;
         match last {
             Some((vertex, entity)) if vertex == claim.vertex => {
                 if claim.entity == POSITION && entity != POSITION {
-                    sorter.push(Node { entity, vertex, point: claim.point })?;
+                    sorter.push(EntityNode { entity, vertex, point: claim.point })?;
                     last = Some((vertex, POSITION));
                 }
             }
@@ -184,7 +181,7 @@ fn granted(
                 // Nobody claims the positions of midpoints: they stand in the order of their numbers.
                 let edge = claim.vertex.checked_sub(n_vertices);
                 if let (Some(points), Some(edge)) = (&mut *points, edge) {
-                    sorter.push(Node {
+                    sorter.push(EntityNode {
                         entity: claim.entity,
                         vertex: claim.vertex,
                         point: Payload(points.of(edge)?),
@@ -197,11 +194,11 @@ fn granted(
 }
 
 /// Counts them and puts them into a file at `path`.
-fn stored(sorted: Sorted<Node>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
+fn stored(sorted: Sorted<EntityNode>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
     let mut nodes =
         Nodes { n: 0, counts: vec![0; entities.tags().len()], span: [u64::MAX, 0], path };
     let Nodes { n, counts, span: [least, greatest], path } = &mut nodes;
-    save(sorted, path, |node: &Node| {
+    save(sorted, path, |node: &EntityNode| {
         *n += 1;
         counts[node.entity as usize] += 1;
         *least = (*least).min(node.vertex + 1);
@@ -228,11 +225,11 @@ impl Nodes {
             }
             out.size(n);
             out.end()?;
-            Records::open(&self.path, first)?.each_of(n, |node: &Node| {
+            RecordReader::open(&self.path, first)?.each_of(n, |node: &EntityNode| {
                 out.size(node.vertex + 1);
                 out.end()
             })?;
-            Records::open(&self.path, first)?.each_of(n, |node: &Node| {
+            RecordReader::open(&self.path, first)?.each_of(n, |node: &EntityNode| {
                 node.point.0.into_iter().for_each(|x| out.double(x));
                 out.end()
             })?;

@@ -5,7 +5,7 @@ use super::super::midpoints::Midpoints;
 use super::ghosts::{Ghost, Ghosts};
 
 /// What a file is of.
-pub(super) struct Piece<'a> {
+pub(super) struct GmshPiece<'a> {
     /// Places of its partitions among all.
     pub which: &'a [usize],
     pub midpoints: Option<&'a Midpoints>,
@@ -13,7 +13,7 @@ pub(super) struct Piece<'a> {
     pub foreign: Option<&'a Ghosts>,
 }
 
-impl Piece<'_> {
+impl GmshPiece<'_> {
     /// Every tetrahedron of another partition that is in the file too.
     pub fn each_ghost(&self, mut each: impl FnMut(&Ghost) -> Result<()>) -> Result<()> {
         let Some(ghosts) = self.foreign else {

@@ -10,12 +10,12 @@ mod shared;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::Result;
-use super::merged::{Merged, Opened};
+use super::merged::{Merged, OpenedPart};
 use super::names::quotable;
+use super::output_files::OutputFiles;
 use super::report::FileCounts;
-use super::selection::Selection;
+use super::selection::ExportSelection;
 use super::stream::Stream;
 use lines::{TETRAHEDRON, TRIANGLE, element, point};
 use shared::Shared;
@@ -25,15 +25,15 @@ use tetdb_store::sealed::Subdomain;
 /// Writes one file of all, or one of each sub-domain.
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
 ) -> Result<FileCounts> {
     mesh.check_limits(out, i32::MAX as u64)?;
     mesh.expect_passes(1, 1);
     let sets = [region_sets(mesh)?, label_sets(mesh)];
     if !selection.pieces {
-        return write_serial(mesh, draft, out, &sets);
+        return write_serial(mesh, outputs, out, &sets);
     }
     let mut shared = Shared::gather(mesh)?;
     let mut counts = FileCounts::default();
@@ -45,7 +45,7 @@ pub(super) fn write(
         let stem = out.file_stem().unwrap_or_default().to_string_lossy();
         let path = out.with_file_name(format!("{stem}.{:06}", row.rank));
         let support_first = mesh.support_first();
-        let written = write_part((&mut opened, support_first), draft, &path, &sets, |stream| {
+        let written = write_part((&mut opened, support_first), outputs, &path, &sets, |stream| {
             shared.write(p as u32, stream)
         })?;
         mesh.advance((written.vertices + written.tets) as usize);
@@ -56,13 +56,13 @@ pub(super) fn write(
 
 fn write_serial(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
     sets: &[String; 2],
 ) -> Result<FileCounts> {
     let counts =
         FileCounts { vertices: mesh.n_vertices(), tets: mesh.n_tets(), triangles: mesh.n_faces() };
-    let mut stream = begin(draft, out, counts)?;
+    let mut stream = begin(outputs, out, counts)?;
     mesh.tets(|tet| element(&mut stream, tet.region.into(), TETRAHEDRON, &tet.nodes))?;
     boundary(&mut stream, counts.triangles, sets);
     mesh.faces().each(|face| {
@@ -78,8 +78,8 @@ fn write_serial(
 
 /// A sub-domain; `end` writes what follows the mesh.
 fn write_part(
-    (opened, support_first): (&mut Opened, u64),
-    draft: &mut Draft,
+    (opened, support_first): (&mut OpenedPart, u64),
+    outputs: &mut OutputFiles,
     out: &Path,
     sets: &[String; 2],
     end: impl FnOnce(&mut Stream) -> Result<()>,
@@ -90,7 +90,7 @@ fn write_part(
         tets: part.row().tets,
         triangles: each_facet(part, support_first, |_| Ok(()))?,
     };
-    let mut stream = begin(draft, out, counts)?;
+    let mut stream = begin(outputs, out, counts)?;
     for tet in part.tets() {
         let tet = tet?.1;
         let nodes = tet.nodes.map(u64::from);
@@ -135,10 +135,10 @@ fn outward([a, b, c]: [u64; 3], regions: [u32; 2]) -> [u64; 3] {
     if regions[0] == 0 { [a, b, c] } else { [a, c, b] }
 }
 
-fn begin(draft: &mut Draft, out: &Path, counts: FileCounts) -> Result<Stream> {
+fn begin(outputs: &mut OutputFiles, out: &Path, counts: FileCounts) -> Result<Stream> {
     let digits = u64::from(counts.vertices.max(1).ilog10());
     let elements = (4 * digits + 9) * counts.tets + (3 * digits + 8) * counts.triangles;
-    let path = draft.create(out, 48 * counts.vertices + elements)?;
+    let path = outputs.create(out, 48 * counts.vertices + elements)?;
     let mut stream = Stream::open(&path)?;
     let n = counts.tets;
     stream.text(&format!("MFEM mesh v1.3\n\ndimension\n3\n\nelements\n{n}\n"));

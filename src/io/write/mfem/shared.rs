@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
+use super::super::merged::{Merged, OpenedPart};
 use super::super::stream::Stream;
 use super::lines::{TRIANGLE, list};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
@@ -41,7 +41,7 @@ sort_record! {
 fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
     let mut entities = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     for p in 0..mesh.n_parts() {
-        let Opened { mut part, numbers, .. } = mesh.open_part(p)?;
+        let OpenedPart { mut part, numbers, .. } = mesh.open_part(p)?;
         let mut push = |face: [u32; 3]| -> Result<()> {
             let [i, j, k] = numbers.of(face)?;
             let mut ends = [(i, face[0]), (j, face[1]), (k, face[2])];

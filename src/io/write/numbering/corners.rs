@@ -7,7 +7,7 @@ use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
 
 sort_record! {
     /// A corner of an element by its vertex.
-    struct Corner {
+    struct ElementCorner {
         vertex: u64,
         /// Number of corners pushed before.
         place: u64,
@@ -25,7 +25,7 @@ sort_record! {
 
 /// Corners being gathered. Memory: the given bytes, twice while they are numbered.
 pub(in crate::write) struct CornerSorter {
-    by_vertex: Sorter<Corner>,
+    by_vertex: Sorter<ElementCorner>,
     n: u64,
     dir: PathBuf,
     memory_bytes: u64,
@@ -44,7 +44,7 @@ impl CornerSorter {
     /// Adds the next corner, at the position of its vertex. Errors: the disk.
     pub fn push(&mut self, vertex: u64, position: [f64; 3]) -> Result<()> {
         self.n += 1;
-        let corner = Corner { vertex, place: self.n - 1, position: Payload(position) };
+        let corner = ElementCorner { vertex, place: self.n - 1, position: Payload(position) };
         Ok(self.by_vertex.push(corner)?)
     }
 
@@ -56,7 +56,7 @@ impl CornerSorter {
         let mut by_place = Sorter::new(&self.dir, self.memory_bytes);
         let (mut n_vertices, mut last) = (0, None);
         for corner in self.by_vertex.finish()? {
-            let Corner { vertex, place, position } = corner?;
+            let ElementCorner { vertex, place, position } = corner?;
             if last.replace(vertex) != Some(vertex) {
                 n_vertices += 1;
                 each(vertex, position.0)?;

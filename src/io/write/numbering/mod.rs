@@ -17,7 +17,7 @@ use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 
 use super::error::Result;
-use super::stream::{Records, save};
+use super::stream::{RecordReader, save};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_store::sealed::{MergeReader, SealedError};
 use tetdb_store::store::Catalog;
@@ -293,7 +293,7 @@ impl Numbering {
         };
         if n > 0 {
             let before = self.shared[..p].iter().sum();
-            Records::open(&self.table, before)?.each_of(n as u64, |entry: &TableEntry| {
+            RecordReader::open(&self.table, before)?.each_of(n as u64, |entry: &TableEntry| {
                 part.locals.push(entry.local);
                 part.numbers.push(entry.number);
                 Ok(())

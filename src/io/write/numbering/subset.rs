@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::write::error::Result;
-use crate::write::stream::{Records, scratch};
-use tetdb_store::sealed::Subdomain;
+use crate::write::stream::{RecordReader, scratch};
+use tetdb_store::sealed::{BitSet, Subdomain};
 
 /// A set of numbers, with the count of members below each.
 ///
@@ -24,10 +24,6 @@ impl RankedSet {
         });
         let before = sums.collect();
         Self { words, before }
-    }
-
-    fn len(&self) -> u64 {
-        self.words.iter().map(|w| u64::from(w.count_ones())).sum()
     }
 
     /// Number of members below `number`; `None` where it is no member.
@@ -49,9 +45,8 @@ pub(in crate::write) struct Subset {
 impl Subset {
     /// Finds the subset in one pass and saves it at `path`; returns the numbers of tetrahedra and vertices. Errors: damage, the disk.
     pub fn gather(part: &mut Subdomain, regions: &BTreeSet<u32>, path: &Path) -> Result<[u64; 2]> {
-        let words = |n: u64| vec![0u64; n.div_ceil(64) as usize];
-        let (mut tets, mut vertices) = (words(part.row().tets), words(part.row().vertices));
         let n_vertices = part.row().vertices;
+        let (mut tets, mut vertices) = (BitSet::new(part.row().tets), BitSet::new(n_vertices));
         for chunk in 0..part.tet_summaries().len() {
             let [least, greatest] = part.tet_summaries()[chunk].regions;
             if regions.range(least..=greatest).next().is_none() {
@@ -60,28 +55,28 @@ impl Subset {
             let chunk = part.tet_chunk(chunk as u32)?;
             for (local, tet) in (chunk.first..).zip(&chunk.records) {
                 if regions.contains(&tet.region) {
-                    tets[local as usize / 64] |= 1 << (local % 64);
+                    tets.insert(local.into());
                     for v in tet.nodes {
                         if u64::from(v) >= n_vertices {
                             part.corner(v)?;
                         }
-                        vertices[v as usize / 64] |= 1 << (v % 64);
+                        vertices.insert(v.into());
                     }
                 }
             }
         }
         let mut stream = scratch(path)?;
-        for word in tets.iter().chain(&vertices) {
+        for word in tets.words().iter().chain(vertices.words()) {
             stream.record(&word.to_le_bytes())?;
         }
         stream.finish()?;
-        Ok([tets, vertices].map(|words| RankedSet::new(words).len()))
+        Ok([tets, vertices].map(|set| set.words().iter().map(|w| u64::from(w.count_ones())).sum()))
     }
 
     /// Loads the subset of a sub-domain with `n` tetrahedra from `path`. Errors: the disk.
     pub fn load(path: &Path, n: u64) -> Result<Self> {
         let mut words = Vec::new();
-        Records::open(path, 0)?.each(|word| {
+        RecordReader::open(path, 0)?.each(|word| {
             words.push(u64::from_le_bytes(*word));
             Ok(())
         })?;
@@ -102,7 +97,6 @@ mod tests {
             words[n as usize / 64] |= 1 << (n % 64);
         }
         let set = RankedSet::new(words);
-        assert_eq!(set.len(), members.len() as u64);
         for n in 0..600 {
             let expected = members.iter().position(|&m| m == n);
             assert_eq!(set.rank(n), expected.map(|i| i as u32));

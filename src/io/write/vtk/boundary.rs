@@ -8,13 +8,13 @@ use std::path::Path;
 
 use super::grid::{Container, Grid, GridWriter};
 use crate::write::columns::column;
-use crate::write::draft::Draft;
 use crate::write::error::Result;
 use crate::write::faces::BoundaryFace;
 use crate::write::merged::Merged;
 use crate::write::midpoints::Midpoints;
 use crate::write::numbering::{CornerSorter, DenseCorners};
-use crate::write::stream::{Records, scratch};
+use crate::write::output_files::OutputFiles;
+use crate::write::stream::{RecordReader, scratch};
 
 /// Consecutive points in the file of the tetrahedra, all or those of a sub-domain: vertices, then midpoints of edges.
 pub(super) struct Partition {
@@ -71,7 +71,7 @@ type PointRow = (u64, i64);
 /// Writes the faces; returns the number of their vertices.
 pub(in crate::write) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
     is_hdf: bool,
     midpoints: Option<&Midpoints>,
@@ -104,7 +104,7 @@ pub(in crate::write) fn write(
     let counts = [n_vertices, n_faces, n_corners];
     let texts = ("label_names", &*label_names(mesh));
     let grid = Grid::new(&container, counts, texts, points, faces);
-    let path = draft.create(out, grid.file_bytes())?;
+    let path = outputs.create(out, grid.file_bytes())?;
     let mut file = grid.open(&path)?;
     write_points(mesh, &mut file, &used, &partitions(mesh, is_hdf, midpoints), midpoints)?;
     file.begin_partition()?;
@@ -121,7 +121,7 @@ fn write_points(
     partitions: &[Partition],
     midpoints: Option<&Midpoints>,
 ) -> Result<()> {
-    let mut used = Records::<[u8; 8]>::open(used, 0)?;
+    let mut used = RecordReader::<[u8; 8]>::open(used, 0)?;
     let mut next = used.next()?;
     mesh.vertices(|number, vertex| {
         if next != Some(number.to_be_bytes()) {

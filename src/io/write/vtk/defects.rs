@@ -9,8 +9,8 @@ use std::path::Path;
 
 use super::grid::{Container, Grid};
 use crate::write::columns::column;
-use crate::write::draft::Draft;
 use crate::write::error::{Result, WriteError};
+use crate::write::output_files::OutputFiles;
 use tetdb_base::surface::{Defect, Surface};
 
 /// Words of defects by their number in the file; no triangle has number 0.
@@ -39,8 +39,8 @@ pub fn defects(surface: &Surface, defects: &[Defect], out: &Path) -> Result<u64>
     let texts: Vec<u8> = KINDS.iter().flat_map(|word| word.bytes().chain([0])).collect();
     let texts = ("defect_names", texts.as_slice());
     let grid = Grid::new(&Container::Xml, [3 * n, n, 3], texts, vec![], columns);
-    let mut draft = Draft::new(out)?;
-    let path = draft.create(out, grid.file_bytes())?;
+    let mut outputs = OutputFiles::new(out)?;
+    let path = outputs.create(out, grid.file_bytes())?;
     let mut file = grid.open(&path)?;
     for (place, (&t, &(kind, count))) in (0u64..).zip(&bad) {
         for position in surface.corners(t) {
@@ -50,7 +50,7 @@ pub fn defects(surface: &Surface, defects: &[Defect], out: &Path) -> Result<u64>
         file.cell(&row, (3 * place..3 * place + 3).map(Ok))?;
     }
     file.finish()?;
-    draft.publish()?;
+    outputs.publish()?;
     Ok(n)
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::write::columns::{Column, Number, put_row};
 use crate::write::error::Result;
-use crate::write::hdf5::{self, Object};
+use crate::write::hdf5::{self, Hdf5Object};
 use crate::write::stream::Strip;
 
 /// Where an array belongs.
@@ -264,7 +264,7 @@ impl Layout {
     fn hdf(partitions: &[[u64; 2]], arrays: &[Array], counts: Counts, texts: Texts) -> Self {
         let n_partitions = partitions.len() as u64;
         let [n_points, n_cells, corners] = counts;
-        let children = |group: Group| -> Vec<Object> {
+        let children = |group: Group| -> Vec<Hdf5Object> {
             let of_group = arrays.iter().filter(|a| a.group == group);
             of_group
                 .map(|array| {
@@ -277,25 +277,25 @@ impl Layout {
                     };
                     let shape = [rows, array.components];
                     let rank = if array.components == 1 { 1 } else { 2 };
-                    Object::array(name, array.number, &shape[..rank])
+                    Hdf5Object::array(name, array.number, &shape[..rank])
                 })
                 .collect()
         };
         let mut top = vec![
-            Object::group("PointData", children(Group::PointData)),
-            Object::group("CellData", children(Group::CellData)),
+            Hdf5Object::group("PointData", children(Group::PointData)),
+            Hdf5Object::group("CellData", children(Group::CellData)),
         ];
         top.extend(children(Group::Points));
         top.extend(children(Group::Cells));
         let of_partitions = ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"];
-        top.extend(of_partitions.map(|name| Object::array(name, Number::I64, &[n_partitions])));
-        let field = Object::array(texts.0, Number::U8, &[texts.1.len() as u64]);
+        top.extend(of_partitions.map(|name| Hdf5Object::array(name, Number::I64, &[n_partitions])));
+        let field = Hdf5Object::array(texts.0, Number::U8, &[texts.1.len() as u64]);
         let fields = if texts.1.is_empty() { vec![] } else { vec![field] };
-        top.push(Object::group("FieldData", fields));
-        let grid = Object::group("VTKHDF", top)
+        top.push(Hdf5Object::group("FieldData", fields));
+        let grid = Hdf5Object::group("VTKHDF", top)
             .with_integers("Version", &[2, 0])
             .with_text("Type", "UnstructuredGrid");
-        let plan = hdf5::plan(&Object::group("", vec![grid]));
+        let plan = hdf5::plan(&Hdf5Object::group("", vec![grid]));
         let starts: Vec<u64> = plan.arrays.iter().map(|&[start, _]| start).collect();
         let (own, small) = starts.split_at(arrays.len());
         let mut fixed = vec![(0, plan.head)];

@@ -12,10 +12,10 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::columns::{Column, column};
-use super::draft::Draft;
 use super::error::{Result, WriteError};
 use super::merged::{Measured, Merged, MergedTet};
 use super::midpoints::Midpoints;
+use super::output_files::OutputFiles;
 use super::selection::Share;
 use super::writers::Writers;
 pub(super) use boundary::write as write_boundary;
@@ -49,7 +49,7 @@ type TetGrid = Grid<i64, MergedTet>;
 /// Writes both files. Several processes may write partitions of a `.vtkhdf`, whose mesh numbers the vertices of each sub-domain apart.
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
     is_hdf: bool,
     midpoints: Option<&Midpoints>,
@@ -66,14 +66,14 @@ pub(super) fn write(
     let texts = ("region_names", &*mesh.region_names());
     let grid = Grid::new(&container, counts, texts, vertex_columns(), tet_columns());
     let mut begin = || {
-        let path = draft.create(out, grid.file_bytes())?;
+        let path = outputs.create(out, grid.file_bytes())?;
         grid.begin(&path).map(|()| path)
     };
     let n = partitions.len();
     let Some(writers) = writers else {
         let path = begin()?;
         write_partitions(mesh, (&grid, &path), &partitions, 0..n, midpoints)?;
-        return write_boundary(mesh, draft, &boundary_path(out), is_hdf, midpoints).map(drop);
+        return write_boundary(mesh, outputs, &boundary_path(out), is_hdf, midpoints).map(drop);
     };
     let Share { number, of } = writers.share();
     let write_own = |mesh: &mut Merged, path: &Path| -> Result<()> {
@@ -87,7 +87,7 @@ pub(super) fn write(
         let path = begin().inspect(|path| writers.announce(path))?;
         write_own(mesh, &path)?;
         mesh.look_at(0..n);
-        write_boundary(mesh, draft, &boundary_path(out), true, None)?;
+        write_boundary(mesh, outputs, &boundary_path(out), true, None)?;
         return writers.wait().map_err(WriteError::Elsewhere);
     }
     let Some(path) = writers.hear() else {

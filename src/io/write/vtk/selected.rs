@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use super::grid::{Container, Grid};
 use crate::write::columns::column;
-use crate::write::draft::Draft;
 use crate::write::error::Result;
 use crate::write::numbering::CornerSorter;
-use crate::write::stream::{Records, Stream, scratch};
+use crate::write::output_files::OutputFiles;
+use crate::write::stream::{RecordReader, Stream, scratch};
 use tetdb_base::storage::{Payload, sort_record};
 
 /// A tetrahedron to be written.
@@ -49,7 +49,7 @@ sort_record! {
 
 /// Tetrahedra being gathered for one `.vtu` file; nothing has its name until [`SelectedVtu::finish`].
 pub struct SelectedVtu {
-    draft: Draft,
+    outputs: OutputFiles,
     out: PathBuf,
     tets: Stream,
     tets_path: PathBuf,
@@ -60,12 +60,12 @@ pub struct SelectedVtu {
 impl SelectedVtu {
     /// Begins `out`, holding about `memory_bytes`. Errors: its folder cannot be written.
     pub fn new(out: &Path, memory_bytes: u64) -> Result<Self> {
-        let draft = Draft::new(out)?;
-        let tets_path = draft.dir().join("cells");
+        let outputs = OutputFiles::new(out)?;
+        let tets_path = outputs.dir().join("cells");
         Ok(Self {
             tets: scratch(&tets_path)?,
-            corners: CornerSorter::new(draft.dir(), memory_bytes / 2),
-            draft,
+            corners: CornerSorter::new(outputs.dir(), memory_bytes / 2),
+            outputs,
             out: out.to_owned(),
             tets_path,
             n: 0,
@@ -86,7 +86,7 @@ impl SelectedVtu {
     /// Writes the file and gives it its name; returns its length. Errors: the disk.
     pub fn finish(mut self) -> Result<u64> {
         self.tets.finish()?;
-        let vertices_path = self.draft.dir().join("points");
+        let vertices_path = self.outputs.dir().join("points");
         let mut vertices = scratch(&vertices_path)?;
         let (n_vertices, mut nodes) = self.corners.finish(|id, position| {
             vertices.record(&VertexRow { id, position: Payload(position) })
@@ -101,13 +101,13 @@ impl SelectedVtu {
         ];
         let counts = [n_vertices, self.n, 4];
         let grid = Grid::new(&Container::Xml, counts, ("", &[]), vertex_columns, tet_columns);
-        let path = self.draft.create(&self.out, grid.file_bytes())?;
+        let path = self.outputs.create(&self.out, grid.file_bytes())?;
         let mut file = grid.open(&path)?;
-        Records::open(&vertices_path, 0)?
+        RecordReader::open(&vertices_path, 0)?
             .each(|vertex: &VertexRow| file.point(vertex, vertex.position.0))?;
-        Records::open(&self.tets_path, 0)?
+        RecordReader::open(&self.tets_path, 0)?
             .each(|tet: &TetRow| file.cell(tet, nodes.by_ref().take(4)))?;
         file.finish()?;
-        self.draft.publish_one()
+        self.outputs.publish_one()
     }
 }

@@ -17,14 +17,14 @@ static NUMBER: AtomicU32 = AtomicU32::new(0);
 
 /// A hidden folder beside the output that holds unfinished files and scratch.
 ///
-/// Invariant: what it holds counts for nobody until [`Draft::publish`]; dropped, it leaves nothing.
-pub(super) struct Draft {
+/// Invariant: what it holds counts for nobody until [`OutputFiles::publish`]; dropped, it leaves nothing.
+pub(super) struct OutputFiles {
     dir: PathBuf,
     /// Unfinished files and where they belong.
     files: Vec<(PathBuf, PathBuf)>,
 }
 
-impl Draft {
+impl OutputFiles {
     /// Makes the folder for `out`. Errors: its place does not exist or may not be written.
     pub fn new(out: &Path) -> Result<Self> {
         let name = out.file_name().unwrap_or_default().to_string_lossy();
@@ -102,14 +102,14 @@ impl Draft {
     }
 }
 
-impl Draft {
-    /// Publishes the one file; returns its length. Errors: as [`Draft::publish`].
+impl OutputFiles {
+    /// Publishes the one file; returns its length. Errors: as [`OutputFiles::publish`].
     pub fn publish_one(self) -> Result<u64> {
         Ok(self.publish()?.iter().map(|(_, bytes)| bytes).sum())
     }
 }
 
-impl Drop for Draft {
+impl Drop for OutputFiles {
     fn drop(&mut self) {
         // Nothing depends on it; a folder that stays is only untidy.
         let _ = fs::remove_dir_all(&self.dir);
