@@ -13,7 +13,7 @@ pub struct FilePlace {
     pub spot: Spot,
 }
 
-/// Where in a file: lines for text (from 1), bytes for binary (from 0).
+/// A position in a file: lines for text (from 1), bytes for binary (from 0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spot {
     /// The file as a whole.
@@ -69,25 +69,25 @@ pub enum ReadFault {
     /// The file ends too early.
     #[error("the file ends too early: expected {expected}, found {found}")]
     Truncated {
-        /// What should have come.
+        /// The expected content.
         expected: String,
-        /// What came instead.
+        /// The content found.
         found: String,
     },
     /// Something else stands where the format asks for a word, a number or an end.
     #[error("expected {expected}, found {found}")]
     Unexpected {
-        /// What should stand there.
+        /// The expected content.
         expected: String,
-        /// What stands there.
+        /// The content found.
         found: String,
     },
     /// A number is not a number, or not finite.
     #[error("expected a finite number as {what}, found {found}")]
     NotANumber {
-        /// What the number is for.
+        /// The meaning of the number.
         what: &'static str,
-        /// What stands there.
+        /// The content found.
         found: String,
     },
     /// A vertex number names no vertex.
@@ -103,7 +103,7 @@ pub enum ReadFault {
     /// A declared number cannot be right.
     #[error("the number of {what} cannot be right: {declared} declared, {found}")]
     CountMismatch {
-        /// What is counted.
+        /// Name of the counted things.
         what: &'static str,
         /// The declared number.
         declared: String,
@@ -119,10 +119,10 @@ pub enum ReadFault {
     /// The file holds no triangles.
     #[error("the file holds no triangles")]
     Empty,
-    /// What the file holds does not fit into the memory allowed. Units: bytes.
+    /// The content of the file does not fit into the memory allowed. Units: bytes.
     #[error("{what} would take {needed} bytes of memory, more than the {limit} there are for them")]
     TooLarge {
-        /// What would take the memory.
+        /// Name of the content.
         what: &'static str,
         /// Memory it would take.
         needed: u64,
@@ -163,12 +163,12 @@ impl ReadError {
         }
     }
 
-    /// Where it happened.
+    /// Place of the fault.
     pub fn place(&self) -> &FilePlace {
         &self.place
     }
 
-    /// What to do about it.
+    /// Advice for the user.
     pub fn help(&self) -> &'static str {
         match &self.fault {
             ReadFault::Unreadable(_) => {

@@ -208,7 +208,7 @@ impl<R: BufRead> Feed<R> {
         Ok(true)
     }
 
-    /// Whether nothing but white space and comments is left.
+    /// Returns whether only white space and comments are left.
     pub fn at_end(&mut self) -> Result<bool> {
         Ok(!self.skip_blank(true)?)
     }

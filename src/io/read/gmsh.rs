@@ -12,7 +12,7 @@ use super::{ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
 
-/// What the sections of one file build up together.
+/// State of a reader that all sections of a file share.
 struct GmshReader<'a, 'b, R> {
     numbers: GmshNumbers<R>,
     target: &'a mut SurfaceSink<'b>,
@@ -26,12 +26,12 @@ struct GmshReader<'a, 'b, R> {
     /// The label used last and the group it came from.
     last: Option<(i64, u32)>,
     n_solids: u64,
-    /// The same of volumes.
+    /// Names and groups of volumes, as of surfaces.
     volume_names: HashMap<i64, String>,
     volume_groups: HashMap<i64, i64>,
     /// By name of a volume's group, the first tetrahedron of each volume.
     first_tets: BTreeMap<String, Vec<[u32; 4]>>,
-    /// The volumes that have one.
+    /// The groups and volumes whose first tetrahedron is known.
     seen: HashSet<(i64, i64)>,
 }
 
@@ -299,7 +299,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 self.numbers.need_record("entities", n, i)?;
                 let entity = self.numbers.int()?;
                 if partitioned {
-                    // Dimension and number of what it is a part of, and the partitions.
+                    // Dimension and number of its parent, and the partitions.
                     let whole = self.numbers.int()?;
                     if (dimension, whole) == (2, 3) {
                         self.inside.insert(entity);

@@ -1,4 +1,4 @@
-//! What Gmsh files of all versions are made of: numbers in text or binary, node tags, element types.
+//! Parts of Gmsh files of all versions: numbers in text or binary, node tags, element types.
 
 use std::collections::HashMap;
 use std::io::BufRead;
@@ -57,7 +57,7 @@ impl<R: BufRead> GmshNumbers<R> {
         self.feed.check_count(what, declared, bytes_min)
     }
 
-    /// In text, whether a record is left before the section ends.
+    /// Refuses the end of a text section before record `found` of `declared`.
     pub fn need_record(&mut self, what: &'static str, declared: u64, found: u64) -> Result<()> {
         if !self.binary && (self.feed.at_end()? || self.feed.peek()? == Some(b'$')) {
             return Err(self.feed.too_few(what, declared, found));
@@ -124,7 +124,7 @@ impl NodeTags {
     }
 }
 
-/// What an element is to a surface.
+/// The role of an element for a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     /// Flat triangles and quadrilaterals.
@@ -176,7 +176,7 @@ pub(super) fn element_type(kind: i64) -> Option<(usize, Role)> {
     })
 }
 
-/// As [`element_type`], or the error that says so.
+/// As [`element_type`]. Errors: an unknown type, a curved face.
 pub(super) fn need_element_type<R: BufRead>(kind: i64, feed: &Feed<R>) -> Result<(usize, Role)> {
     match element_type(kind) {
         Some((_, Role::CurvedFace)) => {

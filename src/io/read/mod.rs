@@ -1,7 +1,7 @@
 //! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen; sizes at the vertices of MEDIT meshes; files of edges and points.
 //!
-//! A declared count is believed only after it was compared with the length of the file; every error
-//! tells its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
+//! A declared count is compared with the length of the file before it is used; every error
+//! has its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
 //! become doubles exactly. Polygons are fanned, vertices with identical bits are one.
 
 mod error;
@@ -67,7 +67,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format a file name's extension tells; `.gz` and `.zst` behind it are passed over.
+    /// The format of a file name's extension; a final `.gz` or `.zst` is skipped.
     pub fn of_extension(path: &Path) -> Option<Self> {
         let path = unpacked_name(path);
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
@@ -85,7 +85,7 @@ impl Format {
         })
     }
 
-    /// The format the first bytes of a file tell, for names that do not.
+    /// The format of a file's first bytes, for names without a known extension.
     fn of_head(head: &[u8], length: u64) -> Option<Self> {
         let starts = |word: &str| {
             head.get(..word.len()).is_some_and(|h| h.eq_ignore_ascii_case(word.as_bytes()))
@@ -108,14 +108,14 @@ impl Format {
     }
 }
 
-/// Whether a length is the one a binary STL with this head must have.
+/// Returns whether a length is that of a binary STL with this head.
 fn is_binary_stl(head: &[u8], length: u64) -> bool {
     head.get(80..84)
         .and_then(|count| count.try_into().ok())
         .is_some_and(|count| length == 84 + 50 * u64::from(u32::from_le_bytes(count)))
 }
 
-/// The kind of solid model a file is, of those that hold no triangles.
+/// The kind of solid model, for files without triangles.
 fn solid_model(path: &Path, head: &[u8]) -> Option<&'static str> {
     let name = unpacked_name(path);
     let extension = name.extension().unwrap_or_default().to_string_lossy();
@@ -131,10 +131,10 @@ fn solid_model(path: &Path, head: &[u8]) -> Option<&'static str> {
 /// Smaller surfaces are refused: single precision, in which wanted lengths are kept, ends at 1e-38.
 const EXTENT_MIN: f64 = 1e-24;
 
-/// Reads files as one surface, each with its name before its labels when there are several.
+/// Reads files as one surface; with several files, each label begins with the name of its file.
 ///
-/// `cap`: bytes of memory that the surface may take. Packed files (`.gz`, `.zst`), pipes and `-`, the standard input, are held unpacked while
-/// they are read: in a quarter of it at most.
+/// `cap`: bytes of memory for the surface. Packed files (`.gz`, `.zst`), pipes and `-`, the standard input, are held unpacked while
+/// they are read, in at most a quarter of `cap`.
 ///
 /// # Errors
 /// The first [`ReadError`], with its file and place; nothing is repaired beyond welding and fanning.
@@ -151,7 +151,7 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
     let surface = builder.finish();
     let bounds = surface.bounds();
     let extent = (bounds.high - bounds.low).max_element();
-    // Points and nothing else are a matter of validation.
+    // Validation refuses surfaces of points alone.
     if extent > 0.0 && extent < EXTENT_MIN {
         let place = FilePlace::of_file(paths.first().map_or(Path::new(""), |path| path));
         return Err(place.refuse(ReadFault::Surface(SurfaceError::TooSmall { extent })));
@@ -159,7 +159,7 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
     Ok(surface)
 }
 
-/// Reads a file that is in memory, called `file` in messages; for tests and fuzzing.
+/// Reads a file from memory; messages name it `file`. For tests and fuzzing.
 ///
 /// TetGen files that refer to a separate `.node` file are refused.
 ///

@@ -9,7 +9,7 @@ use super::feed::{self, Feed, Result};
 
 /// Bytes of the read buffer of one file.
 const BUFFER_BYTES: usize = 256 << 10;
-/// A zstd frame may ask for a window of 2 to this power bytes: 32 MiB, beyond what any ordinary level asks for.
+/// Largest window of a zstd frame, as a power of 2: 32 MiB, which is more than ordinary levels need.
 const WINDOW_LOG_MAX: u32 = 25;
 
 /// A file of any kind, to be read once.
@@ -38,7 +38,7 @@ pub(super) fn unpacked_name(path: &Path) -> PathBuf {
     packing(path).map_or_else(|| path.to_owned(), |(_, inner)| inner)
 }
 
-/// What a file is called, without folder and endings.
+/// The name of a file without folder and endings.
 pub(super) fn stem(path: &Path) -> String {
     let name = unpacked_name(path);
     let text = name.file_stem().unwrap_or_default().to_string_lossy();

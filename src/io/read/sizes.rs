@@ -1,6 +1,6 @@
 //! Sizes at the vertices of a mesh: MEDIT `.sol` or `.solb`, and the `.mesh` or `.meshb` beside it.
 //!
-//! One number per vertex is wanted. With tetrahedra in the mesh it is a background; without a mesh, or with one of triangles
+//! A file has one number for each vertex. A mesh with tetrahedra is a background; without a mesh, or with one of triangles
 //! alone, the sizes are those of the surface's own vertices.
 
 use std::fs::File;
@@ -19,7 +19,7 @@ const SCALAR: i64 = 1;
 const VERTEX_BYTES: u64 = 112;
 const TET_BYTES: u64 = 96;
 
-/// The file of sizes and the mesh beside it that `path` names, whichever of the two it is.
+/// The file of sizes and the mesh beside it, where `path` is either of the two.
 ///
 /// # Errors
 /// Another kind of file; a mesh without sizes.
@@ -62,7 +62,7 @@ pub enum FileSizes {
 /// Reads the sizes that `path` names, holding at most `limit` bytes.
 ///
 /// # Errors
-/// The place of what is no size, no scalar, or does not fit the mesh.
+/// The place of a bad size, a solution that is no scalar, sizes that do not fit the mesh.
 pub fn read_sizes(path: &Path, limit: u64) -> Result<FileSizes> {
     let (sizes, mesh) = size_files(path)?;
     let h = sizes_in(open_medit(&sizes)?, limit)?;

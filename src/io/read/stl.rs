@@ -2,7 +2,7 @@
 //!
 //! Binary: an 80-byte header of no meaning, a u32 count n, then n records of 50 bytes: normal, three
 //! corners (f32 each, little-endian), two spare bytes. So a file of 84 + 50 n bytes is binary, whatever
-//! its header says. Normals are not read: the corner order tells the side.
+//! its header says. Normals are not read: the order of corners gives the side.
 
 use std::io::BufRead;
 

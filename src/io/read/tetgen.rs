@@ -1,8 +1,7 @@
 //! TetGen `.smesh` and `.poly`, with the points in the file or in the `.node` file beside it.
 //!
-//! Each polygon is taken for itself and fanned; a facet of several polygons or with holes is noted,
-//! and overlapping polygons are found by validation. Points that mark holes and regions of the volume become seeds; a region is called
-//! `attribute_N` after its attribute.
+//! Each polygon is fanned on its own. A facet of several polygons or with holes is noted, and overlapping polygons are found by validation.
+//! Points that mark holes and regions of the volume become seeds; a region gets the name `attribute_N` of its attribute.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -176,7 +175,7 @@ pub(super) fn read_segments<R: BufRead>(
     Ok(())
 }
 
-/// What a marker is called; zero stands for none.
+/// The label of a marker; empty for zero, which stands for none.
 fn marker_name(marker: i64) -> String {
     match marker {
         0 => String::new(),
@@ -184,7 +183,7 @@ fn marker_name(marker: i64) -> String {
     }
 }
 
-/// The point part, each with its marker or 0; `None` when it says that the points are elsewhere.
+/// Calls `each` with every point and its marker or 0; returns `None` when the points are in another file.
 fn read_points<R: BufRead>(
     feed: &mut Feed<R>,
     mut each: impl FnMut(Point, i64) -> std::result::Result<(), SurfaceError>,
@@ -225,7 +224,7 @@ fn read_points<R: BufRead>(
         }
         let p = feed.point()?;
         let mut marker = 0;
-        // The line ends the search: what the head says of attributes may be anything.
+        // The end of the line ends the search, because the head may declare any number of attributes.
         for place in 0..=place_of_marker.unwrap_or(0) {
             if !feed.next_word_in_line()? {
                 break;

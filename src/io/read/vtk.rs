@@ -67,7 +67,7 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSin
                     }
                 }
             }
-            // What follows are values at points and cells.
+            // Values at points and cells follow.
             b"POINT_DATA" | b"CELL_DATA" | b"FIELD" => break,
             word => {
                 return Err(vtk.feed.unexpected("POINTS, LINES, VERTICES or CELLS", word));
@@ -82,7 +82,7 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSin
 }
 
 impl<R: BufRead> Vtk<R> {
-    /// From here on numbers follow: binary ones begin behind the end of the line.
+    /// Begins a list of numbers: binary ones begin after the end of the line.
     fn begin_data(&mut self) -> Result<()> {
         if self.is_binary {
             self.feed.skip_line()?;

@@ -10,7 +10,7 @@ use super::{obj, tetgen, vtk};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::WireSet;
 
-/// Reads the edges or the points of a file, labels after its groups or markers, else after the file. `cap`: bytes of memory it may take.
+/// Reads the edges or the points of a file; labels are its groups or markers, else the name of the file. `cap`: bytes of memory allowed.
 ///
 /// # Errors
 /// The first [`ReadError`](super::ReadError) with its place; a file without any is one.

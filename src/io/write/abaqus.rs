@@ -16,11 +16,11 @@ use tetdb_store::sealed::{FaceJoin, FaceJoinSorter};
 
 /// The element's face opposite each of its nodes.
 const SIDE_OPPOSITE: [u8; 4] = [3, 4, 2, 1];
-/// Most numbers of a line of a set.
+/// Greatest number of numbers in a line of a set.
 const PER_LINE: usize = 16;
 
 sort_record! {
-    /// A number and the set that has it.
+    /// A member of a set.
     struct Member {
         set: u32,
         number: u64,

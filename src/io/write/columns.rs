@@ -43,7 +43,7 @@ impl Number {
     }
 }
 
-/// What a row has in a column: one number, or several of one type.
+/// The entry of a row in a column: one number, or several of one type.
 pub(super) trait Cell {
     const NUMBER: Number;
     const COMPONENTS: u64;

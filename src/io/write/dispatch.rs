@@ -1,4 +1,4 @@
-//! One file of a mesh in the format asked for.
+//! One file of a mesh in the requested format.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use super::wires_list::write_list;
 use super::writers::{Writers, is_first};
 use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtk};
 
-/// Writes a mesh as one file, and what belongs to it; the tetrahedra of `.vtkhdf` as one of several `writers`, of whom the first does the rest.
+/// Writes a mesh as one file with its side files. Several `writers` may share the tetrahedra of `.vtkhdf`; the first writes the rest.
 pub(super) fn write(
     format: MeshFormat,
     selection: &ExportSelection,

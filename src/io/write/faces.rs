@@ -1,4 +1,4 @@
-//! Boundary faces of what is written: input triangles in the order of the input, then faces shared with other sub-domains.
+//! Boundary faces of the written mesh: input triangles in the order of the input, then faces shared with other sub-domains.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use super::scope::Scope;
 use super::stream::{RecordReader, Stream, scratch};
 use tetdb_base::storage::{Sorter, sort_record};
 
-/// Marks the key of an interface face, and sorts it behind the input triangles; below it the number of the cut, then of the face.
+/// Bit in the key of an interface face, which sorts it after the input triangles; below it are the numbers of cut and face.
 const INTERFACE: u64 = 1 << 63;
 
 sort_record! {
@@ -19,12 +19,12 @@ sort_record! {
     pub(super) struct BoundaryFace {
         /// Number of the input triangle, or an interface face's cut and number in it.
         key: u64,
-        /// On the side that is left out when both sides are written.
+        /// True for the side that is left out when both sides are written.
         is_second: bool,
         /// Numbers of its vertices: in the input's order, or counter-clockwise seen from the other sub-domain.
         pub vertices: [u64; 3],
         pub label: u32,
-        /// Of an input triangle: in front (where the normal points to) and behind; 0 is empty, and stands for unknown at an interface.
+        /// Regions in front of an input triangle, where the normal points to, and behind it; 0 is empty. Both are 0 at an interface.
         pub regions: [u32; 2],
         /// The sub-domain of its tetrahedron.
         pub subdomain: u32,
@@ -36,19 +36,19 @@ sort_record! {
 }
 
 impl BoundaryFace {
-    /// Its number in the input.
+    /// Number of the triangle in the input; `None` for an interface face.
     pub fn triangle(&self) -> Option<u64> {
         (self.key < INTERFACE).then_some(self.key)
     }
 
-    /// The cut an interface face is of, and its number there.
+    /// Cut of an interface face, and its number in the cut; `None` for an input triangle.
     pub fn cut(&self) -> Option<(u32, u32)> {
         let key = self.key.checked_sub(INTERFACE)?;
         Some(((key >> 32) as u32, key as u32))
     }
 }
 
-/// The sub-domain whose faces are collected, with what the merged mesh knows of it.
+/// The sub-domain whose faces are collected, with its numbers in the merged mesh.
 pub(super) struct FaceSource<'a> {
     pub rank: u32,
     pub numbers: &'a PartNumbers,
@@ -69,8 +69,8 @@ impl FaceSorter {
 
     /// Adds a facet of a sub-domain.
     ///
-    /// A triangle between two sub-domains is in both: the one with its filled side, or with its front when both sides are
-    /// filled, counts, unless it is not written. Errors: the disk.
+    /// A triangle between two sub-domains is in both. The sub-domain on its filled side counts, or on its front when both sides are filled,
+    /// unless that sub-domain is not written. Errors: the disk.
     pub fn push(&mut self, f: &SealedFacet, part: &FaceSource) -> Result<()> {
         let regions = f.regions.map(|region| part.scope.region(region));
         let preferred = usize::from(regions[0] == 0);
@@ -161,7 +161,7 @@ impl FaceFile {
 /// All boundary faces, in a scratch file.
 pub(super) struct BoundaryFaces {
     pub n: u64,
-    /// How many faces each label has.
+    /// Number of faces of each label.
     pub labels: BTreeMap<u32, u64>,
     path: PathBuf,
 }
@@ -172,7 +172,7 @@ impl BoundaryFaces {
         RecordReader::open(&self.path, 0)?.each(each)
     }
 
-    /// The faces that `each` puts for these, at `path`. Errors: the disk, those of `each`.
+    /// Replaces the faces by those that `each` puts, saved at `path`. Errors: the disk, those of `each`.
     pub fn rewritten(
         &self,
         path: &Path,

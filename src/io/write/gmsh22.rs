@@ -1,7 +1,8 @@
 //! Gmsh 2.2, binary: physical surfaces are labels, physical volumes regions.
 //!
 //! Physical and elementary tags are the same: label + 1 on triangles, the region on tetrahedra.
-//! Elements are numbered from 1, triangles first. Of several sub-domains each is a partition, numbered from 1. Source: the Gmsh reference manual, "MSH file format version 2".
+//! Elements are numbered from 1, triangles first. Where there are several sub-domains, each is a partition, numbered from 1.
+//! Source: the Gmsh reference manual, "MSH file format version 2".
 
 use std::path::Path;
 
@@ -16,7 +17,7 @@ const LINE: u32 = 1;
 const POINT: u32 = 15;
 const TRIANGLE: u32 = 2;
 const TETRAHEDRON: u32 = 4;
-/// Tags of an element: physical, elementary; of several sub-domains also the number of its partitions, 1, and the partition.
+/// Tags of an element: physical and elementary; in a mesh of several sub-domains also the number of its partitions, 1, and the partition.
 const N_TAGS: u32 = 2;
 const N_TAGS_PARTITIONED: u32 = 4;
 
@@ -86,7 +87,7 @@ fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
             stream.end()
         })?;
     }
-    // Of several sub-domains they are said to be of the first: the format wants one.
+    // Edges and points are put into the first partition, because the format needs one.
     let wires = mesh.wires();
     if !wires.edges.is_empty() {
         put(stream, &[LINE, wires.edges.len() as u32, n_tags]);

@@ -1,7 +1,7 @@
-//! HDF5 files whose arrays are all known ahead: groups, attributes, and arrays in one run each, filled afterwards in any order.
+//! HDF5 files whose arrays are known in advance: groups, attributes, and contiguous arrays that are filled afterwards in any order.
 //!
-//! Is not a general writer: no chunks, no compression, names in ASCII, and the links of a group in its own header. That is what lets a file
-//! of any size be laid out before its first byte and be written by nobody but the operating system.
+//! Is not a general writer: no chunks, no compression, names in ASCII, and the links of a group in its own header. So a file of any size is laid
+//! out before its first byte is written.
 //! Source: the HDF5 file format specification, version 3.0 (superblock 2, object headers 2); the checksum is Jenkins's `lookup3`.
 
 use super::columns::Number;
@@ -62,7 +62,7 @@ impl Hdf5Object {
         Self { name, attributes, content }
     }
 
-    /// The same with a list of integers attached.
+    /// Attaches a list of integers.
     pub fn with_integers(mut self, name: &'static str, values: &[i64]) -> Self {
         self.attributes.push(Hdf5Attribute {
             name,
@@ -73,7 +73,7 @@ impl Hdf5Object {
         self
     }
 
-    /// The same with a text of ASCII attached.
+    /// Attaches a text of ASCII.
     pub fn with_text(mut self, name: &'static str, text: &str) -> Self {
         let mut datatype = vec![0x13, 0, 0, 0];
         datatype.extend((text.len() as u32).to_le_bytes());

@@ -60,7 +60,7 @@ impl Medit for TextMedit {
     }
 }
 
-/// BinaryMedit, and the position reached: each section tells where the next one begins.
+/// A binary file, and the position reached: each section has the position of the next one.
 struct BinaryMedit(Stream, u64);
 
 impl Medit for BinaryMedit {

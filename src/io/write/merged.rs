@@ -15,7 +15,7 @@ use super::numbering::{
     Numbering, PartNumbers, Sharer, Source, Subset, shareable_vertices, sharers,
 };
 use super::scope::{FaceSet, Scope};
-use super::wires::{WrittenEmbedded, beside};
+use super::wires::{WrittenEmbedded, memory_left};
 use tetdb_base::shape::excess_near;
 use tetdb_base::storage::{Sorted, check_cancelled};
 use tetdb_schema::catalog::SubdomainRow;
@@ -24,7 +24,7 @@ use tetdb_store::sealed::SealedError;
 use tetdb_store::sealed::{FaceJoin, FaceJoinSorter, Shape, Subdomain};
 use tetdb_store::store::Catalog;
 
-/// Counts records and tells.
+/// Counts records and reports progress.
 pub(super) struct ReadProgress<'a> {
     report: &'a dyn Fn(u64, u64),
     done: Cell<u64>,
@@ -37,7 +37,7 @@ impl<'a> ReadProgress<'a> {
         Self { report, done, total }
     }
 
-    /// Counts `n` more records; the place where a request to stop is heard.
+    /// Counts `n` more records; unwinds when the run is cancelled.
     fn advance(&self, n: usize) {
         check_cancelled();
         let done = self.done.get() + n as u64;
@@ -52,21 +52,21 @@ pub(super) struct MergedTet {
     pub nodes: [u64; 4],
     pub region: u32,
     pub subdomain: u32,
-    /// Its name for ever.
+    /// Lasting id.
     pub id: TetId,
-    /// NaN in a pass that does not ask for it.
+    /// NaN in a pass that does not measure it.
     pub quality: f64,
-    /// Its quality over the least that its faces on the surface allow; NaN in a pass that does not ask for it.
+    /// Quality over the least quality that the tetrahedron's faces on the surface allow; NaN in a pass that does not measure it.
     pub excess: f64,
 }
 
-/// What is computed of tetrahedra in a pass.
+/// Measures of tetrahedra in a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Measured {
     Nothing,
     /// [`MergedTet::quality`].
     Quality,
-    /// This and [`MergedTet::excess`].
+    /// [`MergedTet::quality`] and [`MergedTet::excess`].
     Excess,
 }
 
@@ -74,9 +74,9 @@ pub(super) enum Measured {
 #[derive(Clone, Copy)]
 pub(super) struct Part {
     pub rank: u32,
-    /// Number of the first vertex that it numbers.
+    /// Number of the first vertex that the sub-domain numbers.
     pub first_vertex: u64,
-    /// Vertices that it has.
+    /// Vertices of the sub-domain.
     pub n_vertices: u64,
     pub n_tets: u64,
 }
@@ -121,7 +121,7 @@ impl<'a> Merged<'a> {
     ) -> Result<Self> {
         let (label_names, region_names) = (store.labels()?, store.region_names()?);
         let row = store.wires()?;
-        let memory = beside(&row, memory)?;
+        let memory = memory_left(&row, memory)?;
         let parts = sources(store, scope, dir, memory)?;
         let numbering = Numbering::new(store, &parts, scope.apart, dir, memory)?;
         let first_label = label_names.len() as u32;
@@ -165,12 +165,12 @@ impl<'a> Merged<'a> {
         Ok(mesh)
     }
 
-    /// Embedded edges and points that are in it.
+    /// The written embedded edges and points.
     pub fn wires(&self) -> &WrittenEmbedded {
         &self.wires
     }
 
-    /// Facets from this number on are no triangles of the input: each holds an embedded edge.
+    /// Number of the first support triangle: facets from here on hold embedded edges and are no input triangles.
     pub fn support_first(&self) -> u64 {
         self.support_first
     }
@@ -180,12 +180,12 @@ impl<'a> Merged<'a> {
         self.numbering.n_vertices() + self.doubles.as_ref().map_or(0, |doubles| doubles.n)
     }
 
-    /// From now on vertices stand as often as this says.
+    /// Adds doubles of vertices to all later passes.
     pub fn set_doubles(&mut self, doubles: Doubles) {
         self.doubles = Some(doubles);
     }
 
-    /// Puts the faces that `each` puts in the place of the ones it gets. Errors: the disk, those of `each`.
+    /// Replaces each face by those that `each` puts for it. Errors: the disk, those of `each`.
     pub fn rewrite_faces(
         &mut self,
         each: impl FnMut(&BoundaryFace, &mut dyn FnMut(&BoundaryFace) -> Result<()>) -> Result<()>,
@@ -233,22 +233,22 @@ impl<'a> Merged<'a> {
         Ok(regions.filter(|region| self.writes(*region)).collect())
     }
 
-    /// Whether only some regions are written.
+    /// Returns whether only some regions are written.
     pub fn is_of_regions(&self) -> bool {
         !self.regions.is_empty()
     }
 
-    /// Whether the tetrahedra of a region are written.
+    /// Returns whether the tetrahedra of a region are written.
     pub fn writes(&self, region: u32) -> bool {
         self.regions.is_empty() || self.regions.contains(&region)
     }
 
-    /// How many labels the input has.
+    /// Number of labels of the input.
     pub fn n_labels(&self) -> u32 {
         self.label_names.len() as u32
     }
 
-    /// The name of a label; one that the input has not stands for the interface to a sub-domain.
+    /// The name of a label; labels beyond those of the input stand for interfaces to sub-domains.
     pub fn label_name(&self, label: u32) -> String {
         match self.label_names.get(label as usize) {
             Some(name) => name.clone(),
@@ -256,7 +256,7 @@ impl<'a> Merged<'a> {
         }
     }
 
-    /// What a region is called: its own name, or one after its number.
+    /// The name of a region, or `region_N` where it has none.
     pub fn region_name(&self, region: u32) -> String {
         let place = (region as usize).checked_sub(1);
         match place.and_then(|place| self.region_names.get(place)) {
@@ -276,12 +276,12 @@ impl<'a> Merged<'a> {
         }
     }
 
-    /// Counts records that were read past the passes, for progress.
+    /// Counts records that were read outside the passes, for progress.
     pub fn advance(&self, n: usize) {
         self.progress.advance(n);
     }
 
-    /// Refuses a mesh that has not what its records announced.
+    /// Refuses a count that differs from the announced one.
     pub fn expect_count(&self, what: &str, expected: u64, found: u64) -> Result<()> {
         if expected == found {
             return Ok(());
@@ -324,25 +324,25 @@ impl<'a> Merged<'a> {
         self.faces.labels.keys().map(name).collect()
     }
 
-    /// Announces how many passes will come, for progress.
+    /// Announces the number of passes, for progress.
     pub fn expect_passes(&self, vertices: u64, tets: u64) {
         let all = |of: fn(&SubdomainRow) -> u64| self.parts.iter().map(|s| of(&s.row)).sum::<u64>();
         let total = vertices * all(|row| row.vertices) + tets * all(|row| row.tets);
         self.progress.total.set(total);
     }
 
-    /// From now on only the vertices and tetrahedra of some sub-domains are read; of what is counted and numbered nothing changes.
+    /// Narrows all later passes to the vertices and tetrahedra of some sub-domains; counts and numbers stay.
     pub fn look_at(&mut self, window: Range<usize>) {
         self.window = window;
     }
 
-    /// Tells that all is done.
+    /// Reports that all is done.
     pub fn report_end(&self) {
         let total = self.progress.total.get().max(self.progress.done.get());
         (self.progress.report)(total, total);
     }
 
-    /// Refuses what does not fit the format's numbers.
+    /// Refuses a mesh with more vertices or elements than `limit`.
     pub fn check_limits(&self, out: &Path, limit: u64) -> Result<()> {
         let elements = self.n_tets() + self.n_faces();
         for (what, found) in [("vertices", self.n_vertices()), ("elements", elements)] {
@@ -393,7 +393,7 @@ impl<'a> Merged<'a> {
         self.measured_tets(Measured::Nothing, each)
     }
 
-    /// As [`Merged::tets`], measured. Errors: the disk, too.
+    /// As [`Merged::tets`], measured. Errors: also the disk.
     pub fn measured_tets(
         &mut self,
         measured: Measured,
@@ -478,7 +478,7 @@ impl<'a> Merged<'a> {
     }
 }
 
-/// The sub-domains that `scope` holds, and what of them; one of which nothing is written is left out.
+/// The sub-domains in `scope` and their written subsets; a sub-domain without written tetrahedra is left out.
 fn sources(store: &mut Catalog, scope: Scope, dir: &Path, memory: usize) -> Result<Vec<Source>> {
     let mut sources = Vec::new();
     for row in store.subdomains()? {
@@ -516,8 +516,8 @@ fn misplaced(part: &Subdomain, found: u32, expected: u32) -> SealedError {
     part.damaged(format!("tetrahedron {found} stands where {expected} was expected"))
 }
 
-/// Hands the faces of a sub-domain that its scope lists to `sorter`; interface faces are labelled by the sub-domain behind
-/// them, from `first_label` on; facets from `support_first` on are no triangles of the input.
+/// Adds the faces of a sub-domain that its scope lists to `sorter`. Interface faces are labelled by the sub-domain behind
+/// them, from `first_label` on. Facets from `support_first` on are no triangles of the input.
 fn collect_faces(
     from: &mut Subdomain,
     part: &FaceSource,

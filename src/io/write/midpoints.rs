@@ -101,17 +101,17 @@ impl Midpoints {
         self.counts[..p].iter().sum()
     }
 
-    /// Of each tetrahedron the numbers of its edges. Errors: the disk.
+    /// The edge numbers of each tetrahedron. Errors: the disk.
     pub fn tets(&self) -> Result<ElementEdges<6>> {
         self.elements_from(0)
     }
 
-    /// Of each boundary face the numbers of its edges. Errors: the disk.
+    /// The edge numbers of each boundary face. Errors: the disk.
     pub fn faces(&self) -> Result<ElementEdges<3>> {
         self.elements_from(6 * self.n_tets)
     }
 
-    /// Of each embedded edge its number. Errors: the disk.
+    /// The number of each embedded edge. Errors: the disk.
     pub fn lines(&self) -> Result<ElementEdges<1>> {
         self.elements_from(6 * self.n_tets + 3 * self.n_faces)
     }
@@ -133,7 +133,7 @@ pub(super) struct ElementEdges<const N: usize> {
 }
 
 impl<const N: usize> ElementEdges<N> {
-    /// Those of the next element. Errors: the disk.
+    /// The edge numbers of the next element. Errors: the disk.
     pub fn next(&mut self) -> Result<[u64; N]> {
         let mut edges = [0; N];
         for edge in &mut edges {
@@ -143,7 +143,7 @@ impl<const N: usize> ElementEdges<N> {
         Ok(edges)
     }
 
-    /// Those of the element with this number. Errors: the disk.
+    /// The edge numbers of the element with this number. Errors: the disk.
     pub fn of(&mut self, element: u64) -> Result<[u64; N]> {
         self.records.seek(self.first + N as u64 * element)?;
         self.next()

@@ -4,11 +4,11 @@
 //! local) order, a vertex that several sub-domains share once, and every input triangle that bounds
 //! a filled region as a boundary face, in the order of the input. Or each sub-domain becomes a mesh of its own, numbered as in the
 //! store, and the faces that it shares with others are boundary faces too. All is streamed: memory does not
-//! grow with the mesh. Files are written in a folder beside their place and renamed when they are whole
-//! and synced. Coordinates are never rounded.
+//! grow with the mesh. Files are written in a folder beside the output, synced, and renamed when they are
+//! complete. Coordinates are never rounded.
 //!
-//! Reading order: [`export_with`] (what is written, in which format), `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh),
-//! `numbering` (shared vertices), `faces` (its boundary), `output_files` and `stream` (files), then one file or folder per format.
+//! Reading order: [`export_with`], `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh), `numbering` (shared vertices),
+//! `faces` (the boundary), `output_files`, `stream` and `columns` (files), then one file or folder for each format.
 
 mod abaqus;
 mod columns;
@@ -85,11 +85,11 @@ pub fn export(
     export_with(store, (out, selection), memory_bytes, report, None)
 }
 
-/// Writes what `selection` says of the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
+/// Exports the selected part of the finished mesh of `store` to `out`, in the format of its extension; replaces existing files.
 ///
 /// Holds about `memory_bytes`, and reports progress as (done, total) in records read. The files depend on the
-/// mesh alone. Where [`ExportSelection::is_shared_file`] says so, several `writers` may each call this; files and counts are those of the first.
-/// Errors: [`WriteError`], also of others; no file of `out`'s name is touched before all are whole.
+/// mesh alone. If [`ExportSelection::is_shared_file`], several `writers` may each call this function; the first returns files and counts.
+/// Errors: [`WriteError`], also those of other writers; no file of `out`'s name is touched before all are complete.
 pub fn export_with(
     store: &mut Catalog,
     (out, selection): (&Path, &ExportSelection),
@@ -156,7 +156,7 @@ pub fn export_with(
     })?
 }
 
-/// Refuses regions that the store does not have, or that are empty.
+/// Refuses regions that do not exist or are empty.
 fn check_regions(store: &mut Catalog, selection: &ExportSelection) -> Result<()> {
     let rows = store.regions()?;
     let filled: Vec<u32> = (rows.iter().filter(|row| row.filled)).map(|row| row.region).collect();
@@ -166,7 +166,7 @@ fn check_regions(store: &mut Catalog, selection: &ExportSelection) -> Result<()>
     }
 }
 
-/// The format of `out`, if it can hold what is selected.
+/// The format of `out`. Errors: the format cannot hold the selection.
 pub fn check(out: &Path, selection: &ExportSelection) -> Result<MeshFormat> {
     let path = || out.to_owned();
     let known = ENDINGS;

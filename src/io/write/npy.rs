@@ -9,7 +9,7 @@ use super::error::Result;
 use super::output_files::OutputFiles;
 use super::stream::{Stream, Strip};
 
-/// Bytes of every head written here: a multiple of 64, as the format asks, with room for any number of rows.
+/// Bytes of every head written here: a multiple of 64, as the format requires, and enough for any number of rows.
 pub(super) const HEAD_BYTES: usize = 1024;
 /// Magic, version 1.0.
 const MAGIC: &[u8; 8] = b"\x93NUMPY\x01\x00";
@@ -34,7 +34,7 @@ pub struct NpyField {
     pub name: &'static str,
     /// Type of its numbers, such as `<f8`.
     pub kind: &'static str,
-    /// How many numbers it has, such as `4, 3`; empty for one.
+    /// Shape of its numbers, such as `4, 3`; empty for one number.
     pub shape: &'static str,
 }
 
@@ -72,7 +72,7 @@ impl NpyTable {
         self.out.end()
     }
 
-    /// Tells the number of rows in the head and gives the file its name; returns its length. Errors: the disk.
+    /// Writes the number of rows into the head and gives the file its name; returns its length. Errors: the disk.
     pub fn finish(self) -> Result<u64> {
         self.out.finish()?;
         let mut strip = Strip::open(&self.path, 0, HEAD_BYTES as u64)?;

@@ -25,7 +25,7 @@ use tetdb_base::storage::check_cancelled;
 use tetdb_store::sealed::{Shape, Subdomain};
 use tetdb_store::store::Catalog;
 
-/// Rows of a group: small enough that a place is in few of them, large enough for columns to pack well.
+/// Rows of a group: few enough that a box of space meets few groups, enough for columns to compress well.
 const GROUP_ROWS: usize = 65_536;
 
 /// Ids are those of `tetdb query`: they last. `x y z` is the centroid.

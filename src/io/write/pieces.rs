@@ -37,7 +37,7 @@ pub(super) fn write(
     for row in rows {
         let piece = piece_path(out, row.rank, extension);
         let is_written = selection.writes_piece(row.rank);
-        // Who names the pieces of all looks which of them have anything of the regions.
+        // The process that names all pieces reads which of them have tetrahedra of the regions.
         let is_read = is_written || names_all && !selection.regions.is_empty();
         if !is_read {
             pieces.push(piece);
@@ -51,7 +51,7 @@ pub(super) fn write(
         };
         let dir = outputs.dir().join(format!("piece-{}", row.rank));
         fs::create_dir(&dir).map_err(|e| WriteError::io(&dir, e))?;
-        // A piece's records stand for its tetrahedra in the whole.
+        // Progress counts the tetrahedra of all pieces.
         let report_piece = |done: u64, total: u64| {
             let share = done as f64 / total.max(1) as f64;
             report(counts.tets + (share * row.tets as f64) as u64, all);

@@ -1,8 +1,8 @@
-//! Sheets as slits: the vertices on a sheet stand once for each side, and its triangles are boundary on both.
+//! Sheets as slits: the vertices of a sheet are written once for each side, and its triangles are boundary on both.
 //!
-//! A sheet is an input triangle with the same region on both sides. The tetrahedra around each of its vertices fall apart into those that reach
-//! each other through faces that are no sheet's; all but the first of these have a double of the vertex. Around a vertex on a free edge they all
-//! reach each other, so that it stays one.
+//! A sheet is an input triangle with the same region on both sides. The tetrahedra around a vertex of a sheet form
+//! classes that are connected through faces that are no sheet's. The first class keeps the vertex, each other one gets a double of it. Around a
+//! vertex on a free edge there is one class.
 
 use std::path::Path;
 
@@ -39,12 +39,12 @@ sort_record! {
 }
 
 sort_record! {
-    /// What stands for a vertex of a face, on the side that the face is of and on the other.
+    /// The replacements of a face's vertex, on the side of the face's tetrahedron and on the other.
     struct FaceChange {
         face: u64,
         vertex: u64,
         sides: [u64; 2],
-        /// The tetrahedron of a sheet's other side, and its sub-domain; [`NONE`] where that is not written.
+        /// The tetrahedron on the other side of a sheet; [`NONE`] where it is not written.
         back_tet: u64,
         back_rank: u32,
     }
@@ -148,7 +148,7 @@ fn is_sheet(face: &BoundaryFace) -> bool {
     face.regions[0] != 0 && face.regions[0] == face.regions[1]
 }
 
-/// What stands for `vertex` in each of its tetrahedra: itself, or doubles that are numbered from `first` on.
+/// The replacement of `vertex` in each of its tetrahedra: the vertex itself, or doubles numbered from `first` on.
 fn numbers_at(vertex: u64, tets: &[TetCorner], faces: &[FaceCorner], first: u64) -> Vec<u64> {
     let mut sides: Vec<([u64; 3], usize)> = Vec::with_capacity(3 * tets.len());
     for (i, tet) in tets.iter().enumerate() {
@@ -163,7 +163,7 @@ fn numbers_at(vertex: u64, tets: &[TetCorner], faces: &[FaceCorner], first: u64)
     sides.sort_unstable();
     let is_wall = |side: &[u64; 3]| faces.iter().any(|f| f.is_sheet && f.vertices == *side);
     let mut apart: Vec<usize> = (0..tets.len()).collect();
-    // Bodies may touch at a vertex without any sheet, and go on doing so.
+    // Bodies that touch at a vertex without a sheet stay joined.
     let mut whole = apart.clone();
     for pair in sides.windows(2) {
         let [(a, i), (b, j)] = [pair[0], pair[1]];
@@ -177,7 +177,7 @@ fn numbers_at(vertex: u64, tets: &[TetCorner], faces: &[FaceCorner], first: u64)
     let mut next = first;
     let mut numbers = vec![vertex; tets.len()];
     for i in 0..tets.len() {
-        // Each class is called by its first member.
+        // Each class is named by its first member.
         numbers[i] = match apart[i] {
             class if class < i => numbers[class],
             _ if whole[i] == i => vertex,
@@ -190,7 +190,7 @@ fn numbers_at(vertex: u64, tets: &[TetCorner], faces: &[FaceCorner], first: u64)
     numbers
 }
 
-/// Makes one of two classes, each called by its least member.
+/// Joins two classes, each named by its least member.
 fn join(classes: &mut [usize], i: usize, j: usize) {
     let (low, high) = (classes[i].min(classes[j]), classes[i].max(classes[j]));
     if low != high {
@@ -212,7 +212,7 @@ fn face_change(face: &FaceCorner, tets: &[TetCorner], numbers: &[u64]) -> Option
     })
 }
 
-/// Writes the doubles with all that their vertices have.
+/// Saves the doubles with the data of their vertices.
 fn positions(mesh: &mut Merged, originals: &Path, to: &Path) -> Result<()> {
     let mut originals = RecordReader::open(originals, 0)?;
     let mut next = originals.next()?;
@@ -248,7 +248,7 @@ fn pairs(doubles: &Doubles, outputs: &mut OutputFiles, out: &Path, n_vertices: u
     stream.finish()
 }
 
-/// Boundary faces with what stands for their vertices; those of sheets twice, the second time as their backs.
+/// Replaces the vertices of the boundary faces; those of sheets are written twice, the second time as their backs.
 fn split_faces(mesh: &mut Merged, changes: Sorted<FaceChange>) -> Result<()> {
     let mut changes = MergeReader::new(changes);
     let mut number = 0;

@@ -71,7 +71,7 @@ impl Stream {
         self.buffer.push(after);
     }
 
-    /// The same of several numbers.
+    /// Numbers as [`Stream::double`], `between` them one byte and `after` them another.
     pub fn doubles(&mut self, values: impl IntoIterator<Item = f64>, between: u8, after: u8) {
         values.into_iter().for_each(|value| self.double(value, between));
         self.end_list(after);

@@ -10,16 +10,16 @@ use tetdb_base::surface::{Surface, WireSet};
 /// A writer of one format.
 type Write = fn(&Surface, &mut Stream) -> Result<()>;
 
-/// What was written.
+/// The result of writing a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct SurfaceReport {
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// Whether the format has a place for the labels there are.
+    /// True if the format keeps the labels.
     pub labels_kept: bool,
 }
 
-/// Writes `surface` to `out` in the format its extension tells, replacing what is there.
+/// Writes `surface` to `out` in the format of its extension; replaces an existing file.
 ///
 /// `.stl` is text, because binary STL has single precision; `.stlb` is binary when nothing is rounded.
 /// `.ply` is binary with doubles. Errors: [`WriteError`]; `out` is not touched then.
@@ -83,7 +83,7 @@ fn doubles(stream: &mut Stream, before: &str, [x, y, z]: [f64; 3]) {
     stream.double(z, b'\n');
 }
 
-/// Whether triangle `t` begins a run of its label.
+/// Returns whether triangle `t` begins a run of its label.
 fn begins_run(surface: &Surface, t: usize) -> bool {
     t == 0 || surface.labels[t] != surface.labels[t - 1]
 }
@@ -197,7 +197,7 @@ pub fn wires(set: &WireSet, out: &Path) -> Result<()> {
 
 fn ply(surface: &Surface, stream: &mut Stream) -> Result<()> {
     stream.text("ply\nformat binary_little_endian 1.0\n");
-    // Where all triangles have one, a property of it says nothing, and some readers take lists of corners alone.
+    // A property of labels that are all equal is left out: some readers take lists of corners alone.
     let has_labels = surface.label_names.len() > 1;
     for (number, name) in surface.label_names.iter().enumerate() {
         let name = name.replace(['\n', '\r'], " ");

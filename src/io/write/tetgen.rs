@@ -13,7 +13,7 @@ use tetdb_schema::record::tag;
 pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     mesh.expect_passes(1, 1);
     let (n_vertices, n_tets, n_faces) = (mesh.n_vertices(), mesh.n_tets(), mesh.n_faces());
-    // Most numbers have seven digits or more where the space matters.
+    // An estimate with numbers of seven digits, as in large meshes.
     let bytes = 60 * n_vertices + 40 * n_tets + 35 * n_faces;
     let mut begin = |ending: &str, bytes: u64, head: String| -> Result<Stream> {
         let path = outputs.create(&out.with_extension(ending), bytes)?;

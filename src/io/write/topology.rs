@@ -21,7 +21,7 @@ sort_record! {
     struct SharedVertex {
         pair: [u32; 2],
         id: u64,
-        /// Its number in each.
+        /// Number of the vertex in each.
         numbers: [u32; 2],
     }
 }
@@ -31,7 +31,7 @@ sort_record! {
     struct SharedFace {
         pair: [u32; 2],
         cut: u32,
-        /// Its number in the cut.
+        /// Number of the face in the cut.
         index: u32,
         /// Seen from the higher rank.
         is_high: bool,

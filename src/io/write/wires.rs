@@ -19,11 +19,11 @@ pub(super) struct EmbeddedPoint {
     pub point: [f64; 3],
 }
 
-/// Bytes for each edge and point while they are gathered: two vertices in two tables, and itself.
+/// Bytes for each edge or point while it is gathered: two vertices in two tables, and the edge itself.
 const BYTES_EACH: u64 = 256;
 
-/// What is left of `memory` beside the embedded edges and points of a store. Errors: less than these take.
-pub(super) fn beside(row: &WiresRow, memory: usize) -> Result<usize> {
+/// Returns the bytes of `memory` beside the embedded edges and points of a store. Errors: these do not fit.
+pub(super) fn memory_left(row: &WiresRow, memory: usize) -> Result<usize> {
     let needed = BYTES_EACH * (row.edges.len() + row.points.len()) as u64;
     let left = (memory as u64).checked_sub(needed);
     let left = left.ok_or(StorageError::Budget {
@@ -34,17 +34,17 @@ pub(super) fn beside(row: &WiresRow, memory: usize) -> Result<usize> {
     Ok(left as usize)
 }
 
-/// What of the edges and points is in what is written.
+/// Embedded edges and points that are written.
 #[derive(Clone, Default)]
 pub(super) struct WrittenEmbedded {
-    /// Numbers of the vertices of each edge, and its label, by which they are sorted.
+    /// Numbers of the vertices of each edge, and its label; sorted by label.
     pub edges: Vec<([u64; 2], u32)>,
-    /// By label.
+    /// Sorted by label.
     pub points: Vec<EmbeddedPoint>,
 }
 
 impl WrittenEmbedded {
-    /// Those whose vertices are written. Errors: damage, the disk.
+    /// Gathers the edges and points whose vertices are written. Errors: damage, the disk.
     pub fn gather(
         store: &mut Catalog,
         row: &WiresRow,
@@ -90,12 +90,12 @@ impl WrittenEmbedded {
         EdgesToFind(self.edges.iter().map(|(ends, _)| (ascending(*ends), false)).collect())
     }
 
-    /// Keeps the edges that were found: where not all is written, both ends may be and the edge not.
+    /// Keeps the edges that were found. Where only a part is written, an edge may be missing and both its ends not.
     pub fn keep_found(&mut self, edges: &EdgesToFind) {
         self.edges.retain(|(ends, _)| edges.0[&ascending(*ends)]);
     }
 
-    /// How many edges each label has.
+    /// Number of edges of each label.
     pub fn edge_labels(&self) -> BTreeMap<u32, u64> {
         let mut labels = BTreeMap::new();
         for (_, label) in &self.edges {
@@ -104,7 +104,7 @@ impl WrittenEmbedded {
         labels
     }
 
-    /// How many points each label has.
+    /// Number of points of each label.
     pub fn point_labels(&self) -> BTreeMap<u32, u64> {
         let mut labels = BTreeMap::new();
         for point in &self.points {
@@ -114,7 +114,7 @@ impl WrittenEmbedded {
     }
 }
 
-/// Whether each edge is one of a tetrahedron, by its vertices in ascending order.
+/// Embedded edges by their vertices in ascending order; true for those that a tetrahedron has.
 pub(super) struct EdgesToFind(HashMap<[u64; 2], bool>);
 
 impl EdgesToFind {

@@ -1,4 +1,4 @@
-//! Embedded edges and points as a table, for formats without lines.
+//! Embedded edges and points as a table, for formats that have none.
 
 use std::path::Path;
 

@@ -6,10 +6,10 @@ use super::{Finding, Report};
 use crate::sealed::Corner;
 use tetdb_base::surface::Surface;
 
-/// The input and what of it has been seen. Memory: three bits a triangle.
+/// The input, and its triangles found so far. Memory: three bits for each triangle.
 pub(super) struct Input<'a> {
     surface: &'a Surface,
-    /// Seen with a filled front, with a filled back, at all.
+    /// Bits of triangles found with a filled front, with a filled back, at all.
     seen: [Vec<u64>; 3],
     doubled: Vec<DoubledSide>,
 }
@@ -17,10 +17,10 @@ pub(super) struct Input<'a> {
 /// The number of a triangle, and which of its sides is filled twice.
 type DoubledSide = (u32, u8);
 
-/// The triangles that one part of the mesh has.
+/// The triangles of one part of the mesh.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
 pub(super) struct SeenTriangles {
-    /// Of words that are not all zero: which, and their bits as in [`Input`].
+    /// Place and bits of the words that are not all zero, as in [`Input`].
     words: Vec<(u32, [u64; 3])>,
     doubled: Vec<DoubledSide>,
 }
@@ -56,7 +56,7 @@ impl<'a> Input<'a> {
         Self { surface, seen: [(); 3].map(|()| vec![0; words]), doubled: Vec::new() }
     }
 
-    /// What was seen, for [`add`](Self::add) elsewhere.
+    /// Returns the found triangles, for [`add`](Self::add) in another process.
     pub(super) fn into_seen(self) -> SeenTriangles {
         let word = |at: usize| (at as u32, self.seen.each_ref().map(|bits| bits[at]));
         let words = (0..self.seen[0].len()).map(word);
@@ -66,7 +66,7 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// Adds what was seen of another part of the mesh.
+    /// Adds the triangles found in another part of the mesh.
     pub(super) fn add(&mut self, other: SeenTriangles) {
         self.doubled.extend(other.doubled);
         for (at, bits) in other.words {
@@ -125,7 +125,7 @@ impl<'a> Input<'a> {
         None
     }
 
-    /// Counts what was seen; names what is missing.
+    /// Counts the found triangles; reports the missing ones.
     pub(super) fn finish(mut self, report: &mut Report) {
         self.doubled.sort_unstable();
         for &(number, side) in &self.doubled {

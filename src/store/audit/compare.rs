@@ -1,8 +1,8 @@
-//! The qualities of a mesh by kind of tetrahedron, to be set beside another mesh's.
+//! Qualities of a mesh by kind of tetrahedron, to be compared with another mesh's.
 //!
-//! Some tetrahedra are bad whoever made the mesh: those on an input triangle that lets none be better than q = 2, and those
-//! with four vertices on the surface. They are forced, and counted apart. Those with a vertex on an interface are counted apart too: they tell
-//! what the interfaces cost.
+//! Some tetrahedra are bad in every mesh of an input: those on an input triangle that allows none better than q = 2, and those
+//! with four vertices on the surface. These forced ones are counted apart. Tetrahedra with a vertex on an interface are counted apart too: they
+//! show the cost of interfaces.
 
 use tetdb_schema::record::NO_TET;
 
@@ -44,11 +44,11 @@ pub struct Qualities {
     pub interface_faces: u64,
     /// All tetrahedra.
     pub all: Population,
-    /// Those the input does not force.
+    /// Tetrahedra that the input does not force to be bad.
     pub unforced: Population,
-    /// Those the input forces: all vertices are on the surface, or a facet is too badly shaped for a good tetrahedron.
+    /// Tetrahedra that the input forces: all vertices are on the surface, or a facet is too badly shaped for a good tetrahedron.
     pub forced: Population,
-    /// With a vertex on an interface.
+    /// Tetrahedra with a vertex on an interface.
     pub at_interface: Population,
 }
 

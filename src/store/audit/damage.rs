@@ -1,20 +1,20 @@
-//! Whatever cannot be read as it was written, all of it, with its places.
+//! All files and records that cannot be read as they were written, with their places.
 //!
-//! The mesh itself is read by [`verify`](super::verify), chunk by chunk; here every file that counts is, also those that are only kept:
+//! [`verify`](super::verify) reads the mesh itself, chunk by chunk. This module reads every file that counts, also kept ones:
 //! coarse snapshots, previous versions, stages.
 
 use crate::store::{Catalog, StoreError};
 use tetdb_base::storage::check_cancelled;
 use tetdb_schema::catalog::{CoarseRow, SubdomainRow};
 
-/// For chunks and what redb holds of a file.
+/// Memory for chunks and redb's cache.
 const MEMORY_BYTES: usize = 8 << 20;
-/// More are not listed.
+/// Greatest number of listed faults.
 const LISTED_MAX: usize = 1000;
 
-/// What is damaged in the files of sub-domains, coarse snapshots, previous versions and stages, in that order; nothing in a sound store.
+/// Lists the damage in the files of sub-domains, coarse snapshots, previous versions and stages, in that order.
 ///
-/// Errors: a damaged catalog, which tells what files there are; failures of the disk that are no damage.
+/// Errors: a damaged catalog, because it lists the files; failures of the disk that are no damage.
 pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
     let mut found = DamageFound(Vec::new());
     for row in store.subdomains()? {
@@ -24,7 +24,7 @@ pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
     Ok(found.0)
 }
 
-/// The same of the files that are no part of the mesh. Errors: as [`damage`].
+/// Lists the damage in the files that are no part of the mesh. Errors: as [`damage`].
 pub(super) fn damage_of_snapshots(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
     let mut found = DamageFound(Vec::new());
     found.of_snapshots(store)?;
@@ -34,7 +34,7 @@ pub(super) fn damage_of_snapshots(store: &mut Catalog) -> Result<Vec<StoreError>
 struct DamageFound(Vec<StoreError>);
 
 impl DamageFound {
-    /// Takes damage; hands other errors on. Whether there was none.
+    /// Lists damage; returns other errors. Returns whether there was no damage.
     fn note<T, E: Into<StoreError>>(&mut self, read: Result<T, E>) -> Result<bool, StoreError> {
         check_cancelled();
         match read.map_err(E::into) {
@@ -49,7 +49,7 @@ impl DamageFound {
         }
     }
 
-    /// Reads one after the other, until no more damage is listed: a count of chunks that was changed may be any. Whether all were sound.
+    /// Reads all chunks, until the list is full: a damaged count of chunks may be any number. Returns whether all were sound.
     fn all<T, E: Into<StoreError>>(
         &mut self,
         chunks: impl Iterator<Item = Result<T, E>>,
@@ -87,7 +87,7 @@ impl DamageFound {
         is_sound &= self.all((0..tets).map(|chunk| part.tet_chunk(chunk)))?;
         is_sound &= self.all((0..facets).map(|chunk| part.facet_chunk(chunk)))?;
         is_sound &= self.all((0..faces).map(|chunk| part.interface_chunk(chunk)))?;
-        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
+        // Damage of chunks was reported with their places before; the tree between them remains.
         if is_sound {
             self.note(part.check())?;
         }

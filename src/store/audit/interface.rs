@@ -23,7 +23,7 @@ sort_record! {
         other: u32,
         /// Vertex ids in their turn as seen from the lower side, the least first.
         ids: [u64; 3],
-        /// Of the mixes of the vertices' coordinates.
+        /// Sum of the mixes of the vertices' coordinates.
         sum: u64,
     }
 }
@@ -57,7 +57,7 @@ pub(super) struct InterfaceSides {
     pairs: Vec<PairSides>,
 }
 
-/// Two sub-domains at a cut: how many faces they have there, and their digest, from the lower and from the higher side.
+/// Two sub-domains at a cut: number and digest of their faces there, from the lower and from the higher side.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
 struct PairSides {
     cut: u32,
@@ -85,7 +85,7 @@ impl InterfaceAudit {
         Self { sorter: Sorter::new(dir, memory_bytes as u64), sides: BTreeMap::new() }
     }
 
-    /// A face of `subdomain`; its vertices are counter-clockwise seen from outside it.
+    /// Adds a face of `subdomain`, whose vertices are counter-clockwise seen from outside the sub-domain.
     pub(super) fn push(
         &mut self,
         subdomain: u32,
@@ -117,7 +117,7 @@ impl InterfaceAudit {
         })
     }
 
-    /// What was pushed, for [`add`](Self::add) elsewhere. Memory: all of it. Errors: the disk.
+    /// Returns the pushed faces, for [`add`](Self::add) in another process. Memory: all of them. Errors: the disk.
     pub(super) fn into_sides(self) -> Result<InterfaceSides, StorageError> {
         let pairs = self.sides.into_iter();
         let pairs = pairs.map(|(CutPair { cut, low, high }, sides)| PairSides {

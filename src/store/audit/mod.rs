@@ -9,7 +9,7 @@
 //! local tests have shown it. It does not matter which of several equal faces cancels which, therefore
 //! faces are first matched inside each chunk, and only the open ones are sorted externally.
 //!
-//! Sub-domains are looked at one by one, by whatever process; what is found of each is added up in their order.
+//! Sub-domains are verified one by one, by any process; their findings are added up in order.
 //!
 //! Reading order: [`Report`] (what is found), `pass` (once through a sub-domain), `part_report` (what is found there), `pairing` (faces across chunks), `interface` (faces across
 //! sub-domains), `against` and `wires` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
@@ -62,7 +62,7 @@ pub fn verify(
     end(store, audit)
 }
 
-/// Looks at the sub-domains of a verification: is given their rows, the apex for [`verify_part`], and who takes what was found of each, in the
+/// Verifies the sub-domains: gets their rows, the apex for [`verify_part`], and a function that takes the findings of each, in the
 /// order of the rows.
 pub type EachPart<'a> = &'a mut dyn FnMut(
     &[SubdomainRow],
@@ -70,7 +70,7 @@ pub type EachPart<'a> = &'a mut dyn FnMut(
     &mut dyn FnMut(PartReport) -> Result<(), StoreError>,
 ) -> Result<(), StoreError>;
 
-/// The same as [`verify`], sub-domains being looked at by `each`. Errors: also those of `each`.
+/// Like [`verify`], but `each` verifies the sub-domains. Errors: also those of `each`.
 pub fn verify_shared(
     store: &mut Catalog,
     surface: Option<&Surface>,
@@ -93,7 +93,7 @@ fn apex(store: &mut Catalog, rows: &[SubdomainRow], options: &VerifyOptions) -> 
     Some(part.corners(facet.vertices).ok()?[0].point)
 }
 
-/// What a verification finds of one sub-domain. Errors: as [`verify`].
+/// Verifies one sub-domain. Errors: as [`verify`].
 pub fn verify_part(
     part: &mut Subdomain,
     apex: Option<Point>,
@@ -106,9 +106,9 @@ pub fn verify_part(
     audit.into_part()
 }
 
-/// What can be said of the whole alone.
+/// Ends a verification with the checks of the whole mesh.
 fn end(store: &mut Catalog, audit: pass::Audit) -> Result<Report, StoreError> {
-    // What is only kept is no part of the mesh, but who wants it one day must not learn of its damage then.
+    // Kept snapshots and stages are no part of the mesh, but their damage must be found before they are needed.
     if let Some(first) = damage::damage_of_snapshots(store)?.into_iter().next() {
         return Err(first);
     }
@@ -141,7 +141,7 @@ pub fn digest(store: &mut Catalog, memory_bytes: usize) -> Result<[Digest; 2], S
     Ok(both)
 }
 
-/// A folder that goes when it is dropped.
+/// A folder that is removed when it is dropped.
 struct VerifyScratch {
     path: PathBuf,
 }
@@ -159,7 +159,7 @@ impl VerifyScratch {
 
 impl Drop for VerifyScratch {
     fn drop(&mut self) {
-        // Nothing depends on it; a folder that stays is only untidy.
+        // A folder that cannot be removed is only untidy.
         let _ = std::fs::remove_dir_all(&self.path);
     }
 }

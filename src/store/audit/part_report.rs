@@ -1,11 +1,11 @@
-//! What was found of one sub-domain, by whatever process: to be added to what was found of the others.
+//! The findings of one sub-domain, to be added to those of the others by any process.
 
 use super::Report;
 use super::against::SeenTriangles;
 use super::interface::InterfaceSides;
 use super::wires::SeenWires;
 
-/// What was found of one sub-domain. Memory: its interface faces, and bits for its facets.
+/// The findings of one sub-domain. Memory: its interface faces, and bits for its facets.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
 pub struct PartReport {
     pub(super) report: Report,
@@ -14,7 +14,7 @@ pub struct PartReport {
     pub(super) regions: Vec<(u32, u64, f64)>,
     pub(super) volumes: MeshVolumes,
     pub(super) interfaces: InterfaceSides,
-    /// Where there is an input to compare with.
+    /// `None` without an input to compare with.
     pub(super) triangles: Option<SeenTriangles>,
     pub(super) wires: Option<SeenWires>,
 }
@@ -24,9 +24,9 @@ pub struct PartReport {
 pub(super) struct MeshVolumes {
     pub of_tets: f64,
     pub within_boundary: f64,
-    /// Sum of the absolute values of what the volume within the boundary is made of.
+    /// Sum of the absolute values of the summands of the volume within the boundary.
     pub scale: f64,
-    /// What rounding of those values adds up to at most: of needles and thin plates, more than the tolerance.
+    /// Bound of the rounding of these summands; for needles and thin plates it exceeds the tolerance.
     pub rounding: f64,
 }
 

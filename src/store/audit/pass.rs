@@ -43,18 +43,18 @@ pub(super) struct Audit<'a> {
     digests: [Digest; 2],
     regions: RegionSums,
     volumes: MeshVolumes,
-    /// The first corner of the boundary: seen from near, cones do not cancel.
+    /// First corner of the boundary, from which cones to the facets are measured: a distant apex would cancel digits.
     apex: Option<Point>,
 }
 
-/// Two faces of a chunk that are one.
+/// The two sides of a face in a chunk.
 struct FacePair {
     a: u32,
     b: u32,
 }
 
 impl<'a> Audit<'a> {
-    /// `apex`: the first corner of the boundary, where the first sub-domains are looked at elsewhere.
+    /// `apex`: the first corner of the boundary, where other processes read the first sub-domains.
     pub(super) fn new(
         surface: Option<&'a tetdb_base::surface::Surface>,
         options: &'a VerifyOptions,
@@ -83,11 +83,11 @@ impl<'a> Audit<'a> {
     }
 
     pub(super) fn subdomain(&mut self, part: &mut Subdomain) -> Result<(), StoreError> {
-        // Summed by itself, for sums must not depend on who looked at which.
+        // Summed separately: sums must not depend on the process that read a sub-domain.
         let others = std::mem::take(&mut self.volumes);
         self.walk(part)?;
         self.volumes = others.and(&self.volumes);
-        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
+        // Damage of chunks was reported with their places before; the tree between them remains.
         Ok(part.check()?)
     }
 
@@ -244,7 +244,7 @@ impl<'a> Audit<'a> {
         }
     }
 
-    /// What makes each face of a chunk required; findings where a claim is false.
+    /// Marks the required faces of a chunk; reports facets and interface faces that are no faces of their tetrahedra.
     fn marks(
         &mut self,
         part: &mut Subdomain,
@@ -373,7 +373,7 @@ impl<'a> Audit<'a> {
         found.with_tet(tet).with_corners(corners);
     }
 
-    /// The two sides of an inner face: the same marks, none of them an interface's, and the same region where there are none.
+    /// Checks the two sides of an inner face: equal marks, none of an interface, and equal regions where there are none.
     fn agree(
         &mut self,
         rank: u32,
@@ -401,7 +401,7 @@ impl<'a> Audit<'a> {
         self.report.find(finding, rank, what).with_tet(tet).with_corners(corners);
     }
 
-    /// A face that its chunk left open, with all its sides.
+    /// Checks a face that its chunk left open, with all its sides.
     fn open_face(&mut self, part: &mut Subdomain, sides: &[OpenSide]) -> Result<(), StoreError> {
         let rank = part.id().rank();
         let tet = sides[0].reference / 4;
@@ -451,7 +451,7 @@ impl<'a> Audit<'a> {
         Ok(())
     }
 
-    /// What was found, for [`add`](Self::add) elsewhere. Errors: the disk.
+    /// Returns the findings, for [`add`](Self::add) in another process. Errors: the disk.
     pub(super) fn into_part(mut self) -> Result<PartReport, StoreError> {
         Ok(PartReport {
             digests: self.digests.map(|digest| digest.lanes),
@@ -466,7 +466,7 @@ impl<'a> Audit<'a> {
         })
     }
 
-    /// Adds what was found of the next sub-domain. Errors: the disk.
+    /// Adds the findings of the next sub-domain. Errors: the disk.
     pub(super) fn add(&mut self, part: PartReport) -> Result<(), StoreError> {
         self.report.add(part.report);
         for (sum, lanes) in self.digests.iter_mut().zip(part.digests) {
@@ -522,7 +522,7 @@ impl<'a> Audit<'a> {
     }
 }
 
-/// The chunks hold as many records as the catalog counts.
+/// Checks that the chunks hold as many records as the catalog counts.
 fn counted(part: &Subdomain, what: &str, found: u64, total: u64) -> Result<(), StoreError> {
     if found == total {
         return Ok(());

@@ -38,11 +38,11 @@ pub enum Level {
     Topology,
     /// Orientations are exactly positive; facets are the input's triangles, all of them; volumes agree.
     Geometry,
-    /// How many inner faces are locally Delaunay. Informs; decides nothing.
+    /// Share of inner faces that are locally Delaunay; never makes a mesh invalid.
     Delaunay,
 }
 
-/// Kinds of things that make a mesh invalid.
+/// Kinds of faults that make a mesh invalid.
 #[derive(
     Clone,
     Copy,
@@ -100,13 +100,13 @@ pub struct Offender {
     pub finding: Finding,
     /// Rank of the sub-domain where it was found, if there is one.
     pub subdomain: Option<u32>,
-    /// Its tetrahedron, `7:1048211`.
+    /// Id of the tetrahedron, `7:1048211`.
     pub tet: Option<String>,
     /// Ids of the vertices, parallel to `points`.
     pub vertices: Vec<String>,
     /// Positions of the vertices.
     pub points: Vec<[f64; 3]>,
-    /// What was expected and what was found, as a sentence.
+    /// The expected and the found state, as a sentence.
     pub what: String,
 }
 
@@ -117,9 +117,9 @@ pub struct Offender {
 pub struct Report {
     /// How much was checked.
     pub level: Level,
-    /// Whether nothing was found.
+    /// True if there are no findings.
     pub valid: bool,
-    /// Whether the mesh was compared with its input.
+    /// True if the mesh was compared with its input.
     pub against_input: bool,
     /// Number of sub-domains checked.
     pub subdomains: u64,
@@ -155,13 +155,13 @@ pub struct Report {
     pub volume_within_boundary: f64,
     /// Inner faces that are no facets: tested, and with an empty sphere.
     pub delaunay_tested: u64,
-    /// Those of the tested faces that have an empty sphere.
+    /// Number of tested faces that have an empty sphere.
     pub delaunay_faces: u64,
     /// Digest of the whole mesh.
     pub digest: String,
     /// Digest of the interfaces alone.
     pub interface_digest: String,
-    /// How often each kind was found.
+    /// Number of findings of each kind.
     pub findings: BTreeMap<Finding, u64>,
     /// The first of each kind.
     pub offenders: Vec<Offender>,
@@ -243,11 +243,10 @@ pub(super) struct KeptOffender<'a>(Option<&'a mut Offender>);
 impl KeptOffender<'_> {
     /// Adds its tetrahedron.
     pub(super) fn with_tet(self, local: u32) -> Self {
-        Self(self.0.map(|offender| {
-            let subdomain = offender.subdomain.unwrap_or_default();
-            offender.tet = Some(format!("{subdomain}:{local}"));
-            offender
-        }))
+        let Some(offender) = self.0 else { return self };
+        let subdomain = offender.subdomain.unwrap_or_default();
+        offender.tet = Some(format!("{subdomain}:{local}"));
+        Self(Some(offender))
     }
 
     /// Adds ids and positions of vertices.
@@ -263,9 +262,8 @@ impl KeptOffender<'_> {
 
     /// Adds positions.
     pub(super) fn with_points(self, points: impl IntoIterator<Item = Point>) -> Self {
-        Self(self.0.map(|offender| {
-            offender.points = points.into_iter().map(|p| p.to_array()).collect();
-            offender
-        }))
+        let Some(offender) = self.0 else { return self };
+        offender.points = points.into_iter().map(|p| p.to_array()).collect();
+        Self(Some(offender))
     }
 }

@@ -1,6 +1,6 @@
-//! What summaries and rows of the catalog say, compared with what the records give again.
+//! Summaries and rows of the catalog, compared with values recomputed from the records.
 //!
-//! The writer sums in the order of the records, and so is it done here: numbers must agree bit for bit.
+//! The writer sums in the order of the records, and so does this module: numbers must agree bit for bit.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -16,7 +16,7 @@ use crate::sealed::{Corner, RegionTotals, Subdomain, Totals};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
 
-/// Of one sub-domain.
+/// Recomputed values of one sub-domain.
 pub(super) struct Rederived {
     totals: Totals,
     rank: u32,
@@ -31,7 +31,7 @@ impl Rederived {
         Self { totals, rank }
     }
 
-    /// The next chunk of tetrahedra, its corners and its summary.
+    /// Adds the next chunk of tetrahedra, its corners and its summary.
     pub(super) fn add(
         &mut self,
         tets: &[SealedTet],
@@ -46,7 +46,7 @@ impl Rederived {
         };
         let (first, rank) = (stored.first, self.rank);
         let Ok(mut found) = self.totals.add(first, tets, rank, corners_of);
-        // Both are known elsewhere: faces are counted when they are paired, bytes when they are read.
+        // Both are checked elsewhere: faces when they are paired, bytes when they are read.
         (found.open_faces, found.bytes) = (stored.open_faces, stored.bytes);
         // Summaries of earlier versions lack it.
         if stored.edge_max == 0.0 {
@@ -120,7 +120,7 @@ impl Rederived {
 pub(super) fn check_regions(rows: &[RegionRow], sums: &RegionSums, report: &mut Report) {
     for row in rows {
         let found = sums.get(&row.region).copied().unwrap_or_default();
-        // Of an empty region only its surface is known.
+        // The volume of an empty region is not known.
         if row.tets != found.tets || (row.filled && row.volume != found.volume) {
             let RegionRow { region, tets, .. } = row;
             let what = format_args!(
@@ -132,7 +132,7 @@ pub(super) fn check_regions(rows: &[RegionRow], sums: &RegionSums, report: &mut 
     }
 }
 
-/// Compares who neighbors whom with the interfaces, which were compared with their faces; and the list of files with who needs them.
+/// Compares the neighbors with the interfaces, which were compared with their faces, and the list of files with the rows that need them.
 ///
 /// Errors: a damaged catalog.
 pub(super) fn check_catalog(store: &mut Catalog, report: &mut Report) -> Result<(), StoreError> {

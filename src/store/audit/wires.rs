@@ -1,4 +1,4 @@
-//! The mesh against the input's wires: every edge an edge of a tetrahedron, every point one of its vertices, bit for bit.
+//! The mesh against the embedded edges and points: every edge is an edge of a tetrahedron, every point a vertex, bit for bit.
 
 use std::collections::HashMap;
 
@@ -9,16 +9,16 @@ use tetdb_base::surface::Surface;
 /// Bytes for each edge and point.
 const BYTES_EACH: u64 = 100;
 
-/// Edges and points that are looked for.
+/// A search for embedded edges and points.
 pub(super) struct WireSearch<'a> {
     surface: &'a Surface,
-    /// Of vertices, the lower number first: which edge, and whether it was seen.
+    /// Embedded edges by their vertices, the lower number first: number of the edge, and true if the mesh has it.
     edges: HashMap<[u32; 2], (usize, bool)>,
-    /// Of a vertex of a wire: which point it is, if it is one, and whether it was seen.
+    /// Vertices of embedded edges and points: number of the point, if it is one, and true if the mesh has the vertex.
     vertices: HashMap<u32, (Option<usize>, bool)>,
 }
 
-/// The edges and points that one part of the mesh has.
+/// The edges and points of one part of the mesh.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
 pub(super) struct SeenWires {
     /// The vertices of each edge, the lower number first.
@@ -26,14 +26,14 @@ pub(super) struct SeenWires {
     vertices: Vec<u32>,
 }
 
-/// Bytes that the search for the edges and points of a surface holds.
+/// Bytes of the search for the edges and points of a surface.
 pub fn wire_bytes(surface: &Surface) -> u64 {
     let wires = &surface.wires;
     BYTES_EACH * (wires.edges.len() + wires.points.len()) as u64
 }
 
 impl<'a> WireSearch<'a> {
-    /// None where there is nothing to look for.
+    /// Returns `None` where the surface has no embedded edges and points.
     pub fn new(surface: &'a Surface) -> Option<Self> {
         let wires = &surface.wires;
         let edges = wires.edges.iter().enumerate();
@@ -48,7 +48,7 @@ impl<'a> WireSearch<'a> {
         })
     }
 
-    /// Looks at the vertices and edges of a tetrahedron.
+    /// Searches the vertices and edges of a tetrahedron.
     pub fn see(&mut self, corners: &[Corner; 4]) {
         let bits = |p: tetdb_base::geom::Point| p.to_array().map(f64::to_bits);
         let found = corners.each_ref().map(|corner| {
@@ -69,7 +69,7 @@ impl<'a> WireSearch<'a> {
         }
     }
 
-    /// What was seen, for [`add`](Self::add) elsewhere.
+    /// Returns the found edges and vertices, for [`add`](Self::add) in another process.
     pub fn into_seen(self) -> SeenWires {
         let edges = self.edges.into_iter().filter(|(_, (_, is_seen))| *is_seen);
         let vertices = (self.vertices.into_iter()).filter(|(_, (_, is_seen))| *is_seen);
@@ -79,7 +79,7 @@ impl<'a> WireSearch<'a> {
         }
     }
 
-    /// Adds what was seen of another part of the mesh.
+    /// Adds the edges and vertices found in another part of the mesh.
     pub fn add(&mut self, other: &SeenWires) {
         for ends in &other.edges {
             if let Some((_, is_seen)) = self.edges.get_mut(ends) {
@@ -93,7 +93,7 @@ impl<'a> WireSearch<'a> {
         }
     }
 
-    /// Counts what was seen; names what is missing.
+    /// Counts the found edges and points; reports the missing ones.
     pub fn finish(self, report: &mut Report) {
         let wires = &self.surface.wires;
         let mut edges = vec![false; wires.edges.len()];

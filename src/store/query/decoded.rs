@@ -11,7 +11,7 @@ use tetdb_schema::record::SealedTet;
 /// A tetrahedron of a frame.
 #[derive(Clone, Copy)]
 pub(super) struct FrameTet {
-    /// Its number in the sub-domain.
+    /// Number of the tetrahedron in the sub-domain.
     pub local: u32,
     pub region: u32,
     /// Places of its vertices in the frame.
@@ -33,7 +33,7 @@ pub(super) struct Searched {
 }
 
 impl DecodedChunk {
-    /// The tetrahedra of a chunk that `keep` wants, with their vertices.
+    /// Decodes the tetrahedra of a chunk that `keep` accepts, with their vertices.
     ///
     /// Errors: damage.
     pub fn new(
@@ -78,13 +78,13 @@ impl DecodedChunk {
         tet.nodes.map(|v| self.ids[v as usize])
     }
 
-    /// Its lasting id.
+    /// Lasting id of a tetrahedron.
     pub fn id(&self, tet: &FrameTet) -> TetId {
         let id = TetId::new(self.part, tet.local);
         id.expect("the reader counted the tetrahedra of the sub-domain")
     }
 
-    /// A tetrahedron with all that is known of it.
+    /// A tetrahedron as an answer.
     pub fn hit(&self, tet: &FrameTet) -> Hit {
         Hit::new(self.id(tet), tet.region, self.ids(tet), self.corners(tet))
     }

@@ -14,7 +14,7 @@ pub(super) trait Ring: Clone {
     fn sign(&self) -> Option<Ordering>;
 }
 
-/// A double and how far it is from the truth at most.
+/// A double and a bound on its error.
 #[derive(Clone, Copy)]
 pub(super) struct Near {
     value: f64,
@@ -108,7 +108,7 @@ impl<R: Ring> Vector<R> {
     }
 }
 
-/// Whether the number is not below zero.
+/// Returns whether the number is not below zero; `None` if rounding hides its sign.
 pub(super) fn not_negative<R: Ring>(x: &R) -> Option<bool> {
     x.sign().map(|s| s != Ordering::Less)
 }

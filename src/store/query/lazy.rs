@@ -1,4 +1,4 @@
-//! A single point, with as few chunks as can be.
+//! Location of a single point with as few chunks as possible.
 //!
 //! No vertex of a tetrahedron that holds the point is farther from it than the longest edge of its chunk, and the tetrahedron lies in
 //! the box around its vertices. Of a vertex that has not been read the box of its chunk is known. So a chunk of
@@ -28,18 +28,18 @@ struct Waiting {
     chunks: [u32; 4],
 }
 
-/// What is wanted, and what has been read.
+/// A search for one point, with the chunks read so far.
 struct Lazy {
     point: Point,
     /// No vertex of a tetrahedron that holds the point is farther away.
     reach: f64,
     waiting: Vec<Waiting>,
-    /// Chunks of vertices looked at, by sub-domain and number: what they have near, and whether they are read.
+    /// Chunks of vertices by sub-domain and number: their vertices near the point, and whether they are read.
     chunks: IdMap<(u32, u32), (Near, bool)>,
 }
 
 impl Lazy {
-    /// What a chunk of vertices has near the point, and whether it is read.
+    /// Vertices of a chunk near the point, and whether the chunk is read.
     fn near(&mut self, part: &Subdomain, chunk: u32) -> (Near, bool) {
         let (p, reach) = (self.point, self.reach);
         let new = || (Near::of(part, chunk as usize, p, reach), false);
@@ -47,7 +47,7 @@ impl Lazy {
         *self.chunks.entry(key).or_insert_with(new)
     }
 
-    /// From now on the chunk is read.
+    /// Marks a chunk as read.
     fn note(&mut self, rank: u32, chunk: u32) {
         if let Some((_, is_read)) = self.chunks.get_mut(&(rank, chunk)) {
             *is_read = true;
@@ -126,10 +126,10 @@ impl QuerySession {
         let mut place = 0;
         for (local, tet) in (records.first..).zip(records.records) {
             if let Some(&v) = tet.nodes.iter().find(|&&v| u64::from(v) >= n_vertices) {
-                // Says what is wrong.
+                // Returns the error.
                 part.corner(v)?;
             }
-            // Nearly all are ruled out by the vertex that leads them: where the others are is not asked.
+            // The leading vertex rules out nearly all tetrahedra, before the others are looked up.
             let (mut chunks, mut around) = ([0; 4], Some(Aabb::EMPTY));
             for (v, chunk) in tet.nodes.into_iter().zip(&mut chunks) {
                 *chunk = vertex_chunk(part, v, &mut place) as u32;
@@ -147,7 +147,7 @@ impl QuerySession {
         Ok(())
     }
 
-    /// Reads chunks of vertices that are not farther than `most` until the point is settled; looks at what has all its vertices.
+    /// Reads chunks of vertices that are not farther than `most` until the point is settled; tests tetrahedra whose vertices are all read.
     fn read_up_to(
         &mut self,
         most: f64,
@@ -186,7 +186,7 @@ impl QuerySession {
     }
 }
 
-/// Whether a vertex that leads tetrahedra of the chunk may be near enough; reads what chunks of vertices that takes, the nearest first.
+/// Returns whether a vertex that leads tetrahedra of the chunk may be near enough; reads the chunks of vertices this takes, the nearest first.
 fn is_led_near(
     part: &mut Subdomain,
     candidate: &ChunkCandidate,
@@ -217,7 +217,7 @@ fn is_led_near(
     Ok(false)
 }
 
-/// Whether what is known of its vertices lets the tetrahedron hold the point.
+/// Returns whether the known bounds of its vertices let the tetrahedron hold the point.
 fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut Lazy) -> Result<bool, StoreError> {
     let mut around = Aabb::EMPTY;
     for (v, chunk) in w.tet.nodes.into_iter().zip(w.chunks) {
@@ -229,7 +229,7 @@ fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut Lazy) -> Result<bool, 
     Ok(holds(&around, lazy.point))
 }
 
-/// Where a vertex of a chunk lies, as far as that is known; `None`: too far away.
+/// Known bounds of a vertex of a chunk; `None` if the vertex is too far away.
 #[inline]
 fn bounds_near(
     part: &mut Subdomain,

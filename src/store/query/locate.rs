@@ -1,4 +1,4 @@
-//! Which tetrahedron holds a point.
+//! Location of points: the tetrahedra that hold them.
 
 use std::ops::Range;
 
@@ -12,13 +12,13 @@ use super::{QueryError, QuerySession};
 use crate::sealed::Subdomain;
 use tetdb_base::geom::{Aabb, HilbertFrame, Point, orient};
 
-/// Up to so many points are looked for one by one, each in as few chunks as can be; more make it worth to decode chunks whole.
+/// Greatest number of points that are located one by one, each in as few chunks as possible; for more it pays to decode whole chunks.
 const FEW: usize = 16;
 
-/// A point and the tetrahedron that holds it; of several, which then have it on a face, the one with the least id.
+/// A point and the tetrahedron that holds it; of several tetrahedra with the point on a face, the one with the least id.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {
-    /// The point asked for.
+    /// The point.
     pub point: Point,
     /// `None` outside the mesh.
     pub found: Option<Hit>,
@@ -32,22 +32,22 @@ pub(super) struct ChunkCandidate {
     pub rank: u32,
     pub chunk: u32,
     resident: bool,
-    /// Negative where the point is within the box of vertices that lead its tetrahedra.
+    /// Least distance of a leading vertex; negative where the point is within the box of such vertices.
     nearness: f64,
-    /// How far vertices of a tetrahedron that holds the point can be.
+    /// Greatest distance of a vertex of a tetrahedron that holds the point.
     pub reach: f64,
 }
 
-/// What is known of a point so far.
+/// State of the search for a point.
 pub(super) struct Search {
     pub point: Point,
     pub best: Option<(Hit, [f64; 4])>,
-    /// Whether the point is strictly inside `best`: no other tetrahedron holds it.
+    /// True if the point is strictly inside `best`, so that no other tetrahedron holds it.
     pub settled: bool,
 }
 
 impl Search {
-    /// Looks at a tetrahedron.
+    /// Tests a tetrahedron.
     pub fn look(&mut self, id: TetId, corners: &[Point; 4], found: impl FnOnce() -> Hit) {
         let Some(shares) = shares(corners, self.point) else {
             return;
@@ -74,7 +74,7 @@ fn shares(corners: &[Point; 4], p: Point) -> Option<[f64; 4]> {
     Some(shares)
 }
 
-/// Whether a box holds a point.
+/// Returns whether a box holds a point.
 pub(super) fn holds(bounds: &Aabb, p: Point) -> bool {
     bounds.low.cmple(p).all() && p.cmple(bounds.high).all()
 }
@@ -82,7 +82,7 @@ pub(super) fn holds(bounds: &Aabb, p: Point) -> bool {
 impl QuerySession {
     /// Finds the tetrahedra of `points`; the answers are in their order.
     ///
-    /// Many points share the chunks they need: they are looked for in the order of the Hilbert curve.
+    /// Points are located in the order of the Hilbert curve, so that they share chunks.
     /// Memory: some 300 bytes a point. Errors: damage.
     pub fn locate(&mut self, points: &[Point]) -> Result<Vec<Located>, QueryError> {
         let curve = HilbertFrame::new(&self.bounds());
@@ -181,7 +181,7 @@ pub(super) fn leaders(part: &Subdomain, chunk: usize) -> Range<u32> {
     first..last.min(n_vertices)
 }
 
-/// How near they are, as far as the boxes of their chunks tell.
+/// Least distance of the leading vertices of a chunk, bounded by the boxes of their chunks.
 fn leaders_nearness(part: &Subdomain, chunk: usize, p: Point) -> f64 {
     let leaders = leaders(part, chunk);
     let first = part.vertex_chunk_of(leaders.start);

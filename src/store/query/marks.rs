@@ -1,4 +1,4 @@
-//! Which tetrahedra of a sub-domain have a face on input triangles or on an interface: a bit for each.
+//! Tetrahedra of a sub-domain with a face on input triangles or on an interface: a bit for each.
 
 use super::selection::Selection;
 use super::{QueryError, QuerySession};
@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 use tetdb_base::storage::{Lease, check_cancelled};
 use tetdb_schema::record::{NO_TET, SealedFacet};
 
-/// Bytes in tables for an embedded edge that is asked for: itself, its ends and their numbers in a sub-domain.
+/// Bytes of tables for an embedded edge: itself, its ends and their numbers in a sub-domain.
 const WIRE_BYTES: u64 = 128;
 
 /// A bit for each tetrahedron of a sub-domain.
@@ -22,7 +22,7 @@ impl Marks {
         self.bits.contains(local.into())
     }
 
-    /// Whether any of `count` tetrahedra from `first` on is marked.
+    /// Returns whether any of `count` tetrahedra from `first` on is marked.
     pub fn any(&self, first: u32, count: u32) -> bool {
         let (mut at, end) = (first, first + count);
         while at < end {
@@ -40,7 +40,7 @@ impl Marks {
         false
     }
 
-    /// Only what the other has too.
+    /// Keeps the tetrahedra that are also in the other set.
     fn and(&mut self, other: &Self) {
         let words = self.bits.words_mut().iter_mut().zip(other.bits.words());
         words.for_each(|(own, other)| *own &= other);
@@ -48,7 +48,7 @@ impl Marks {
 }
 
 impl QuerySession {
-    /// The tetrahedra of a sub-domain that suit labels and interface, or `None` where neither is asked for.
+    /// The tetrahedra of a sub-domain that satisfy the conditions on labels, sheets and interface; `None` without such conditions.
     ///
     /// Errors: damage; a budget that has not a bit for each.
     pub fn marks(&mut self, rank: u32, selection: &Selection) -> Result<Option<Marks>, QueryError> {

@@ -2,11 +2,11 @@
 //!
 //! A [`QuerySession`] holds a store open within a budget: some sub-domains' summaries, and the chunks decoded last. A
 //! question rules out sub-domains by their boxes, then chunks by their summaries (box, qualities, regions, vertices), and
-//! decides with exact signs inside the chunks that are left. Answers come as iterators; nothing here knows formats.
+//! decides with exact signs inside the chunks that are left. Answers are iterators; this module has no file formats.
 //!
 //! Reading order: `solid` (boxes, balls, planes and what meets them) on `exact`; `decoded` (a decoded chunk) and `tree`;
 //! `session` (what is held open); `locate` (points), `lazy` (a single point); `hit` (a tetrahedron with its columns);
-//! `selection` (what is asked for), `marks` (tetrahedra on the surface and on interfaces), `surface_faces` (their faces on the surface), `select` (the answers one after the other),
+//! `selection` (conditions), `marks` (tetrahedra on the surface and on interfaces), `surface_faces` (their faces on the surface), `select` (the answers one after the other),
 //! `order` (sorted), `extreme` (the worst few), `around` (tetrahedra around vertices, edges, neighbors).
 
 mod around;

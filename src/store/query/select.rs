@@ -26,7 +26,7 @@ pub struct Selected<'a> {
 }
 
 impl QuerySession {
-    /// Tetrahedra of which all of `selection` holds, in the order of their ids.
+    /// Tetrahedra that satisfy all of `selection`, in the order of their ids.
     ///
     /// Errors: sub-domains the store does not have; an interface that is not there.
     pub fn select(&mut self, selection: Selection) -> Result<Selected<'_>, QueryError> {
@@ -71,7 +71,7 @@ impl QuerySession {
 }
 
 impl Selected<'_> {
-    /// What it has cost so far.
+    /// Cost of the session so far.
     pub fn measures(&self) -> crate::query::Measures {
         self.inquiry.measures()
     }
@@ -134,7 +134,7 @@ impl Iterator for Selected<'_> {
     }
 }
 
-/// What suits in one chunk, ascending by id.
+/// Hits in one chunk, ascending by id.
 pub(super) fn hits_in(
     inquiry: &mut QuerySession,
     selection: &Selection,
@@ -162,7 +162,7 @@ pub(super) fn hits_in(
     Ok(found.filter(|found| selection.holds(found)).collect())
 }
 
-/// Which places of a chunk of tetrahedra matter to a selection: a tetrahedron that meets it has all its vertices as near as its longest edge is long.
+/// Places of a chunk that matter to a selection: all vertices of a tetrahedron that meets it are within the length of its longest edge.
 #[derive(Default)]
 struct Nearby {
     /// For a chunk of vertices a box around those of its cells that are near enough; empty where none are.
@@ -171,7 +171,7 @@ struct Nearby {
 }
 
 impl Nearby {
-    /// What chunk `c` of vertices has for tetrahedra with edges not longer than `reach`.
+    /// Box around the cells of chunk `c` of vertices that matter to tetrahedra with edges not longer than `reach`.
     fn of(&mut self, part: &Subdomain, selection: &Selection, reach: f64, c: usize) -> Aabb {
         *self.boxes.entry(c).or_insert_with(|| {
             let mut near = Aabb::EMPTY;
@@ -186,7 +186,7 @@ impl Nearby {
         })
     }
 
-    /// Whether a tetrahedron of the chunk with these vertices may meet the selection.
+    /// Returns whether a tetrahedron of the chunk with these vertices may meet the selection.
     fn may_meet(
         &mut self,
         part: &Subdomain,
@@ -208,7 +208,7 @@ impl Nearby {
     }
 }
 
-/// Whether a vertex that leads tetrahedra of the chunk may be near enough to the selection.
+/// Returns whether a vertex that leads tetrahedra of the chunk may be near enough to the selection.
 fn is_led_near(part: &Subdomain, selection: &Selection, chunk: usize) -> bool {
     let leaders = leaders(part, chunk);
     let first = part.vertex_chunk_of(leaders.start);

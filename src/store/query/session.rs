@@ -1,4 +1,4 @@
-//! What is held open while questions are answered, within a budget.
+//! Open sub-domains and decoded chunks while questions are answered, within a budget.
 
 use std::sync::Arc;
 
@@ -22,10 +22,10 @@ const PART_BYTES: u64 = 8 << 20;
 const PARTS_MAX: u64 = 64;
 /// Bytes beyond which more frames help no question.
 const FRAMES_BYTES_MAX: u64 = 2 << 30;
-/// What the summaries of a chunk take, twice, for trees.
+/// Bytes of the summaries of a chunk, twice, for trees.
 const SUMMARY_BYTES: u64 = 256;
 
-/// What questions cost.
+/// Cost of questions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Measures {
     /// Chunks of tetrahedra read, and of vertices; one read twice counts twice.
@@ -82,13 +82,13 @@ pub struct OpenSubdomain {
 /// Shape: `rows` by rank. Memory: half of the budget for decoded chunks, a quarter for open sub-domains, the rest for
 /// answers on their way.
 pub struct QuerySession {
-    /// The store asked about.
+    /// The store.
     pub store: Catalog,
-    /// Its sub-domains by rank.
+    /// Sub-domains by rank.
     pub rows: Vec<SubdomainRow>,
     /// Names of labels of the surface.
     pub labels: Vec<String>,
-    /// Of region 1, 2, …; empty for one without a name.
+    /// Names of regions 1, 2, …; empty for a region without a name.
     pub region_names: Vec<String>,
     /// Embedded edges and points.
     pub wires: WiresRow,
@@ -102,7 +102,7 @@ pub struct QuerySession {
     frames_bytes_max: usize,
     /// Memory left for other uses.
     pub budget: Budget,
-    /// Faces on the surface of the sub-domain asked about last, where excess is asked for.
+    /// Faces on the surface of the last sub-domain whose excess was needed.
     pub(super) surface: Option<Arc<SurfaceFaces>>,
     measures: Measures,
     /// The plane of the cut, of a mesh that was kept on its way.
@@ -186,7 +186,7 @@ impl QuerySession {
         self.cutting
     }
 
-    /// What all questions so far have cost.
+    /// Cost of all questions so far.
     pub fn measures(&self) -> Measures {
         let mut sum = self.measures;
         for (_, part) in &self.parts {
@@ -222,13 +222,13 @@ impl QuerySession {
             let row = self.rows.iter().find(|row| row.rank == rank);
             let row = match row {
                 Some(row) => row.clone(),
-                // Says that there is none.
+                // Returns the error.
                 None => self.store.subdomain(rank)?,
             };
             let subdomain = self.store.open_row(row, PART_BYTES as usize)?;
             let chunks = subdomain.tet_summaries().len() + subdomain.vertex_summaries().len();
             let bytes = chunks as u64 * SUMMARY_BYTES;
-            // What the share of a sub-domain does not cover.
+            // The part that the share of a sub-domain does not cover.
             let more = bytes.saturating_sub(PART_BYTES / 8);
             let lease = match more {
                 0 => None,
@@ -242,7 +242,7 @@ impl QuerySession {
         Ok(self.parts.get_mut(&rank).expect("it was just put there"))
     }
 
-    /// Whether a chunk is decoded at hand.
+    /// Returns whether a chunk is decoded in memory.
     pub fn is_resident(&self, rank: u32, chunk: u32) -> bool {
         self.frames.contains(&(rank, chunk))
     }
@@ -263,7 +263,7 @@ impl QuerySession {
         Ok(searched)
     }
 
-    /// The tetrahedra of a chunk that `keep` wants, decoded.
+    /// Decodes the tetrahedra of a chunk that `keep` accepts.
     pub(super) fn frame(
         &mut self,
         rank: u32,
@@ -309,7 +309,7 @@ impl QuerySession {
     }
 }
 
-/// A chunk of tetrahedra that is what its summary says.
+/// Reads a chunk of tetrahedra and compares it with its summary.
 pub fn checked_chunk(part: &mut Subdomain, chunk: u32) -> Result<Chunk<SealedTet>, StoreError> {
     let records = part.tet_chunk(chunk)?;
     let summary = &part.tet_summaries()[chunk as usize];
@@ -336,9 +336,9 @@ pub fn chunk_bounds(part: &Subdomain, chunk: usize) -> Aabb {
     Aabb { low, high }
 }
 
-/// How far the vertices of a chunk's tetrahedra can be from a point that one of them holds: not farther than its longest edge.
+/// Greatest distance between a point and the vertices of a chunk's tetrahedra that hold it: the longest edge of the chunk.
 pub fn reach(part: &Subdomain, chunk: usize) -> f64 {
-    /// More than what rounding takes from lengths.
+    /// Covers the rounding of lengths.
     const SLACK: f64 = 1.0 + 1e-6;
     match part.tet_summaries()[chunk].edge_max {
         told if told > 0.0 => f64::from(told) * SLACK,

@@ -1,4 +1,4 @@
-//! Boxes under boxes: which of many boxes, near each other when their numbers are, meet a place.
+//! A tree of boxes over items whose neighbors in number are near in space.
 
 use tetdb_base::geom::Aabb;
 
@@ -7,7 +7,7 @@ const FAN: usize = 8;
 
 /// Shape: `levels[0][i]` = box around items `8 i..8 i + 8`; each level above holds eight boxes of the one below.
 ///
-/// Items themselves are not kept: whoever asks looks at the eight.
+/// Items themselves are not kept: callers test the eight.
 pub(super) struct OctalBoxTree {
     levels: Vec<Vec<Aabb>>,
     n: usize,

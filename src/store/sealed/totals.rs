@@ -1,4 +1,4 @@
-//! What is summed over the tetrahedra of a sub-domain while it is written.
+//! Sums over the tetrahedra of a sub-domain while it is written.
 
 use std::collections::BTreeMap;
 
@@ -15,30 +15,30 @@ use tetdb_schema::catalog::QualityRow;
 /// Tetrahedra whose corners are held at once.
 const PIECE: usize = 4096;
 
-/// What is summed over tetrahedra, in their order.
+/// Sums over tetrahedra, in their order.
 pub struct Totals {
-    /// Of the tetrahedra.
+    /// Digest of the tetrahedra.
     pub digest: Digest,
-    /// Of the vertices; whoever has them sets it.
+    /// Bounds of the vertices, set by the caller.
     pub bounds: Aabb,
     /// As in [`QualityRow`].
     pub bins: [u64; QUALITY_BINS],
     /// Greatest quality.
     pub worst: f64,
-    /// The first that has it.
+    /// The first tetrahedron of the greatest quality.
     pub worst_tet: u32,
     /// Least and greatest cosine of a dihedral angle.
     pub cosines: [f64; 2],
-    /// Sum in order.
+    /// Sum of the volumes, in order.
     pub volume: f64,
-    /// By number.
+    /// Sums of the regions by number.
     pub regions: BTreeMap<u32, RegionTotals>,
-    /// Of the piece at hand; kept, for memory that is asked for anew is cleared by the system each time.
+    /// Vertices of the current piece; kept, because the system clears newly allocated memory.
     corners: Vec<[VertexSum; 4]>,
     shapes: Vec<Shape>,
 }
 
-/// What is summed of a vertex.
+/// The parts of a vertex that are summed.
 #[derive(Clone, Copy)]
 struct VertexSum {
     point: Point,
@@ -52,7 +52,7 @@ impl VertexSum {
     }
 }
 
-/// Tetrahedra of one region that follow each other: the map of regions is asked once for all.
+/// Consecutive tetrahedra of one region, so that the map of regions is searched once.
 struct RegionRun {
     region: u32,
     totals: RegionTotals,
@@ -69,8 +69,8 @@ impl RegionRun {
     }
 }
 
-/// Extends a box to a point: one instruction for each side, where a minimum that knows what is no number takes four. Coordinates that are
-/// none are left out here too.
+/// Extends a box to a point with one instruction for each side; a minimum that treats NaN takes four. Coordinates that are
+/// NaN are left out here too.
 #[inline(always)]
 fn extend(bounds: &mut Aabb, p: Point) {
     let less = |a: f64, b: f64| if a < b { a } else { b };
@@ -108,7 +108,7 @@ pub(super) fn count_open(pairs: &mut FacePairs, tets: &[SealedTet]) -> u32 {
     open
 }
 
-/// Of nothing.
+/// Sums of no tetrahedra.
 impl Default for Totals {
     fn default() -> Self {
         Self {
@@ -127,7 +127,7 @@ impl Default for Totals {
 }
 
 impl Totals {
-    /// Adds a chunk and returns its summary, but for what only its bytes and faces tell.
+    /// Adds a chunk and returns its summary without the number of open faces and the bytes.
     ///
     /// Errors: those of `corners_of`.
     pub fn add<E>(
@@ -152,7 +152,7 @@ impl Totals {
         };
         let mut buffers = (std::mem::take(&mut self.corners), std::mem::take(&mut self.shapes));
         let (corners, shapes) = (&mut buffers.0, &mut buffers.1);
-        // Rounded once: what is rounded keeps its order.
+        // Rounded once at the end: rounding keeps the order.
         let (mut quality, mut edge_max) = ([f64::INFINITY, 0.0f64], 0.0f64);
         // A piece at a time: the corners of a whole chunk would take ten times its bytes.
         for (piece, first) in tets.chunks(PIECE).zip((first..).step_by(PIECE)) {
@@ -226,11 +226,11 @@ impl Totals {
     }
 }
 
-/// What a region has in this sub-domain.
+/// Sums of a region in this sub-domain.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct RegionTotals {
-    /// Its tetrahedra.
+    /// Number of tetrahedra.
     pub tets: u64,
-    /// Summed in the sealed order.
+    /// Volume, summed in the sealed order.
     pub volume: f64,
 }

@@ -12,27 +12,27 @@ use super::form::Loader;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::StoreFile;
 
-/// Chunks kept whatever the budget: a tetrahedron needs four at once.
+/// Chunks kept with any budget: a tetrahedron needs four at once.
 const CHUNKS_LEAST: usize = 4;
 const NOT_RESIDENT: u32 = u32::MAX;
 
-/// A vertex as an algorithm wants it.
+/// A decoded vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
-    /// Its position.
+    /// Position.
     pub point: Point,
-    /// Its mix in the digest.
+    /// Mix of the position in the digest.
     pub mix: u64,
-    /// Its name for ever, as a number.
+    /// Lasting id as a number.
     pub id: u64,
     /// One of [`tag`](tetdb_schema::record::tag).
     pub tag: u32,
-    /// The edge length wanted there; 0 where none was.
+    /// Wanted edge length; 0 where there is none.
     pub h: f32,
 }
 
 impl Corner {
-    /// Its number among the vertices of the input; `None` for a vertex that is not the input's.
+    /// Number of the vertex in the input; `None` for a vertex that is not the input's.
     #[inline]
     pub fn input_index(&self) -> Option<u32> {
         input_index(self.id)
@@ -50,7 +50,7 @@ pub fn input_index(id: u64) -> Option<u32> {
 #[derive(Clone, Copy)]
 struct ResidentChunk {
     chunk: u32,
-    /// Vertices from this one on, below that.
+    /// First vertex, and one after the last.
     first: u32,
     end: u32,
     /// Place in `resident`.
@@ -63,8 +63,8 @@ impl ResidentChunk {
 
 /// Decoded vertex chunks within a budget.
 ///
-/// Turning to a chunk other than the last two sets its reference bit; the `lru` crate orders the chunks when one is missed, and a chunk
-/// whose bit is set gets a second chance. Shape: `firsts[i]` = number of the first vertex of chunk `i`.
+/// Using a chunk other than the last two sets its reference bit. The `lru` crate orders the chunks when one is missed, and a chunk
+/// whose bit is set is kept a second time. Shape: `firsts[i]` = number of the first vertex of chunk `i`.
 pub struct VertexCache {
     subdomain: u32,
     generation: u32,
@@ -78,7 +78,7 @@ pub struct VertexCache {
     order: LruCache<u32, ()>,
     loader: Loader<SealedVertex>,
     scratch: Vec<SealedVertex>,
-    /// Chunks asked last: corners of near tetrahedra lie in one or two.
+    /// The last two chunks used: corners of close tetrahedra are in one or two.
     last: [ResidentChunk; 2],
     bytes: usize,
     bytes_max: usize,
@@ -145,7 +145,7 @@ impl VertexCache {
         }
     }
 
-    /// The chunk of `v`, resident, in place of the one of the last two that was asked first.
+    /// Makes the chunk of `v` resident and the latest of the last two.
     #[inline(never)]
     fn turn_to(&mut self, file: &mut StoreFile, v: u32) -> Result<ResidentChunk, SealedError> {
         if v >= self.n_vertices {
@@ -232,7 +232,7 @@ impl VertexCache {
                 self.order.put(chunk, ());
                 continue;
             }
-            // Whoever asks for it next has it read again.
+            // The chunk is read again when it is next needed.
             for window in &mut self.last {
                 if window.chunk == chunk {
                     *window = ResidentChunk::EMPTY;

@@ -1,4 +1,4 @@
-//! Makes the file of a finished sub-domain: vertices, then tetrahedra, then faces, each a stream.
+//! Writes the file of a finished sub-domain: vertices, then tetrahedra, then faces, each a stream.
 
 use std::collections::BTreeMap;
 
@@ -26,18 +26,18 @@ pub struct InterfaceSide {
     pub cut: u32,
     /// The sub-domain on the other side.
     pub other: u32,
-    /// How many faces there are.
+    /// Number of faces.
     pub faces: u64,
-    /// Of the faces, seen from this side.
+    /// Digest of the faces seen from this side.
     pub digest: Digest,
 }
 
-/// What was sealed.
+/// The result of sealing a sub-domain.
 #[derive(Clone, Debug)]
 pub struct Sealed {
     /// The row to put into the catalog.
     pub row: SubdomainRow,
-    /// Of each region with tetrahedra here, by number.
+    /// Sums of each region with tetrahedra in the sub-domain, by number.
     pub regions: BTreeMap<u32, RegionTotals>,
     /// By cut, then by the other sub-domain.
     pub interfaces: Vec<InterfaceSide>,
@@ -63,7 +63,7 @@ pub struct SealedWriter {
     vertex_chunks: Vec<VertexSummary>,
     cache: Option<VertexCache>,
     tets: Cutter<SealedTet>,
-    /// To be summed up and stored.
+    /// Tetrahedra that are packed and not yet summed up and stored.
     packed: Vec<Cut<SealedTet>>,
     tet_chunks: Vec<TetSummary>,
     facets: Cutter<SealedFacet>,
@@ -88,7 +88,7 @@ impl SealedWriter {
         Self::create_as(Form::Sealed, path, subdomain, generation, memory_bytes)
     }
 
-    /// The same in either form. Errors: as [`SealedWriter::create`].
+    /// Starts the file in either form. Errors: as [`SealedWriter::create`].
     pub fn create_as(
         form: Form,
         path: impl Into<DiskPath>,
@@ -125,7 +125,7 @@ impl SealedWriter {
         })
     }
 
-    /// The next vertex; its number is its place in the stream.
+    /// Adds a vertex, whose number is its place in the stream.
     ///
     /// Errors: the disk.
     pub fn push_vertex(&mut self, vertex: SealedVertex) -> Result<(), SealedError> {
@@ -157,7 +157,7 @@ impl SealedWriter {
         self.put(chunk.values)
     }
 
-    /// Ends the stream of vertices: from now on they can be read.
+    /// Ends the stream of vertices, so that they can be read.
     fn end_vertices(&mut self) -> Result<(), SealedError> {
         if self.cache.is_some() {
             return Ok(());
@@ -178,7 +178,7 @@ impl SealedWriter {
         Ok(())
     }
 
-    /// All tetrahedra, by nodes and region: positive, in the order of their numbers.
+    /// Adds all tetrahedra by nodes and region: positive, in the order of their numbers.
     ///
     /// Errors: as [`SealedWriter::push_tets`].
     pub fn push_all_tets(
@@ -194,10 +194,10 @@ impl SealedWriter {
         Ok(())
     }
 
-    /// Some thousands of the next tetrahedra, rotated ([`SealedTet::rotated`]), each with what a working page tells of it; chunks do not. The number of
+    /// Adds some thousands of tetrahedra, rotated ([`SealedTet::rotated`]), each with the data that only a working page keeps. The number of
     /// each is its place in the stream.
     ///
-    /// They are taken and packed while another thread sums up those before. Smallest when they come sorted by their nodes.
+    /// One thread takes and packs them while another sums up those before. The file is smallest when they come sorted by their nodes.
     /// Errors: those of `tets`; the disk; a vertex that was not pushed.
     pub fn push_tets<E: From<SealedError> + Send>(
         &mut self,
@@ -247,7 +247,7 @@ impl SealedWriter {
         Ok(())
     }
 
-    /// The next facet.
+    /// Adds a facet.
     ///
     /// Errors: the disk.
     pub fn push_facet(&mut self, facet: SealedFacet) -> Result<(), SealedError> {
@@ -264,7 +264,7 @@ impl SealedWriter {
         self.put(chunk.values)
     }
 
-    /// The next interface face.
+    /// Adds an interface face.
     ///
     /// Errors: the disk; a vertex that was not pushed.
     pub fn push_interface_face(&mut self, face: InterfaceFace) -> Result<(), SealedError> {
@@ -304,7 +304,7 @@ impl SealedWriter {
         Ok(packer.chunks())
     }
 
-    /// Writes what is left, shrinks the file and closes it.
+    /// Writes the remaining records, shrinks the file and closes it.
     ///
     /// Errors: the disk.
     pub fn finish(mut self) -> Result<Sealed, SealedError> {

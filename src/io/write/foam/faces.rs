@@ -17,7 +17,7 @@ sort_record! {
     /// A face of a tetrahedron.
     struct CellFace {
         vertices: [u32; 3],
-        /// 2 · tetrahedron + whether its view of the ascending vertices is odd.
+        /// 2 · tetrahedron + 1 if the ascending vertices are an odd permutation of its face.
         cell_odd: u32,
     }
 }
@@ -54,7 +54,7 @@ sort_record! {
         other: u32,
         cut: u32,
         index: u32,
-        /// Number in the whole of the cell behind it, [`NO_TET`] where that is not written.
+        /// Number in the whole of the cell behind it; [`NO_TET`] where that cell is not written.
         cell: u32,
     }
 }
@@ -73,7 +73,7 @@ sort_record! {
 sort_record! {
     /// A face on the boundary.
     pub(super) struct OuterFace {
-        /// Its label, or behind all labels the sub-domain behind it, which is not written.
+        /// Label of the face; numbers behind all labels stand for sub-domains that are not written.
         pub patch: u32,
         pub owner: u32,
         /// Counter-clockwise seen from outside the owner.
@@ -113,19 +113,19 @@ sort_record! {
 /// No zone.
 pub(super) const NO_ZONE: u32 = 0;
 
-/// The zone of an inner input triangle: its label and whether the face looks against it.
+/// The zone of an inner input triangle: its label, and whether the face has the opposite direction.
 pub(super) fn zone_of(zone: u32) -> Option<(u32, bool)> {
     Some(((zone >> 1).checked_sub(1)?, zone & 1 == 1))
 }
 
-/// What is known of the faces before any is written.
+/// Counts of the faces, made before any is written.
 #[derive(Default)]
 pub(super) struct Census {
-    /// Of each sub-domain, faces of each patch.
+    /// For each sub-domain, the number of faces of each patch.
     pub patches: Vec<BTreeMap<u32, u64>>,
-    /// Of each sub-domain, faces between it and each other one that is written.
+    /// For each sub-domain, the number of faces between it and each other one that is written.
     pub between: Vec<BTreeMap<u32, u64>>,
-    /// Labels of input triangles with cells on both sides.
+    /// For each label, the number of input triangles with cells on both sides.
     pub zones: BTreeMap<u32, u64>,
 }
 
@@ -362,7 +362,7 @@ fn turned([a, b, c]: [u32; 3], odd: bool) -> [u32; 3] {
     if odd { [a, c, b] } else { [a, b, c] }
 }
 
-/// Whether cells are written on both sides.
+/// Returns whether cells are written on both sides.
 fn is_inner(mesh: &Merged, facet: &SealedFacet) -> bool {
     let is_written = |&region: &u32| region != 0 && mesh.writes(region);
     facet.regions.iter().all(is_written)

@@ -1,6 +1,6 @@
 //! OpenFOAM: `constant/polyMesh` of the whole, or `processorN/constant/polyMesh` of each sub-domain with its numbers in the whole.
 //!
-//! Faces stand in the order that OpenFOAM asks for: those with two cells by owner, then by neighbor; then patch by patch. A patch for each
+//! Faces are in OpenFOAM's order: those with two cells by owner, then by neighbor; then patch by patch. A patch for each
 //! label with faces on the boundary, a face zone for each label with cells on both sides, a cell zone for each region. The faces that two
 //! sub-domains share are patches of both, in one order, and begin at the same vertex. Reading order: `faces`, `serial`, `processors`,
 //! `polymesh` and `file` (what is written).
@@ -47,7 +47,7 @@ pub(super) fn write(
     serial::write(mesh, outputs, &case, (&mut walk, &names), ascii)
 }
 
-/// About what all files need, and the sorted faces of the largest sub-domain beside them.
+/// Approximate bytes of all files and of the sorted faces of the largest sub-domain.
 fn needed_bytes(mesh: &Merged, ascii: bool) -> u64 {
     let parts = mesh.parts();
     let cells = mesh.n_tets();
@@ -61,7 +61,7 @@ fn needed_bytes(mesh: &Merged, ascii: bool) -> u64 {
     size.bytes(ascii) + SCRATCH_BYTES * largest.unwrap_or(0)
 }
 
-/// A case that was decomposed into more parts would mix the meshes.
+/// Refuses a case that was decomposed into more parts: the meshes would mix.
 fn refuse_more_processors(case: &Path, n: usize) -> Result<()> {
     let path = case.join(format!("processor{n}"));
     if !path.exists() {
@@ -73,7 +73,7 @@ fn refuse_more_processors(case: &Path, n: usize) -> Result<()> {
     Err(WriteError::Io { path, source })
 }
 
-/// What patches and zones are called, the same in every processor.
+/// Names of patches and zones, the same in every processor.
 fn names(mesh: &mut Merged, walk: &FaceWalk) -> Result<Names> {
     let census = &walk.census;
     let patches: BTreeSet<u32> = (census.patches.iter().flat_map(|p| p.keys()).copied()).collect();

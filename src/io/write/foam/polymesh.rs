@@ -13,14 +13,14 @@ pub(super) fn mesh_dir(root: &Path) -> PathBuf {
     root.join("constant").join("polyMesh")
 }
 
-/// What patches and zones are called, by label and region, in the order in which they are written.
+/// Names of patches and zones by label and region, in the order in which they are written.
 pub(super) struct Names {
     pub patches: BTreeMap<u32, String>,
     pub face_zones: BTreeMap<u32, String>,
     pub cell_zones: BTreeMap<u32, String>,
 }
 
-/// How much a mesh has.
+/// Counts of a mesh.
 #[derive(Clone, Copy)]
 pub(super) struct Size {
     pub points: u64,
@@ -30,7 +30,7 @@ pub(super) struct Size {
 }
 
 impl Size {
-    /// About what its files need.
+    /// Approximate bytes of the files.
     pub fn bytes(&self, ascii: bool) -> u64 {
         let (number, point) = if ascii { (8, 50) } else { (4, 24) };
         point * self.points + number * (5 * self.faces + self.inner + self.cells)
@@ -91,7 +91,7 @@ impl FaceFiles {
         self.faces.face(vertices)
     }
 
-    /// How many faces are written.
+    /// Number of faces written so far.
     pub fn written(&self) -> u64 {
         self.written
     }
@@ -193,7 +193,7 @@ impl Zones {
         Ok(())
     }
 
-    /// Writes `cellZones` or `faceZones` with all of `names`, also those that nothing here is in.
+    /// Writes `cellZones` or `faceZones` with all of `names`; a zone may be empty.
     pub fn write(
         self,
         outputs: &mut OutputFiles,

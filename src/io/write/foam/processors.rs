@@ -19,29 +19,29 @@ use tetdb_base::storage::{Sorter, sort_record};
 use tetdb_store::sealed::MergeReader;
 
 sort_record! {
-    /// Where a face between two sub-domains is in the whole.
+    /// A face between two sub-domains and its number in the whole.
     struct FaceAddress {
         rank: u32,
         other: u32,
         cut: u32,
         index: u32,
-        /// Its number in the whole, from 1.
+        /// Number of the face in the whole, from 1.
         face: u32,
     }
 }
 
-/// What is written for every processor.
+/// Inputs that all processors share, and the state of the walk over them.
 struct ProcessorFiles<'j> {
     case: &'j Path,
     names: &'j Names,
     ascii: bool,
     /// Faces of the whole before those of the first patch.
     n_inner: u64,
-    /// Faces of each patch in the sub-domains before this one, and before it in the whole.
+    /// For each patch, the number of faces of the whole before those of the current sub-domain.
     patch_starts: BTreeMap<u32, u64>,
 }
 
-/// Writes the processors that are selected; all are read, for numbers in the whole depend on those before.
+/// Writes the selected processors. All are read, because numbers in the whole depend on the processors before.
 pub(super) fn write(
     mesh: &mut Merged,
     outputs: &mut OutputFiles,
@@ -121,7 +121,7 @@ impl ProcessorFiles<'_> {
         mesh_dir(&self.case.join(format!("processor{rank}")))
     }
 
-    /// Faces, boundary and face zones of a sub-domain; its addresses but for faces between sub-domains, which go to `addresses`.
+    /// Writes faces, boundary and face zones of a sub-domain, and the addresses of its faces; `addresses` gets those of faces between sub-domains.
     fn faces(
         &mut self,
         mesh: &mut Merged,

@@ -16,7 +16,7 @@ sort_record! {
     /// A face on the boundary of the whole.
     struct OuterFaceInOrder {
         patch: u32,
-        /// Its place among those of all sub-domains: a cell's faces keep the order that its sub-domain alone gives them.
+        /// Number of outer faces before it, over all sub-domains: the faces of a cell keep their order.
         place: u32,
         owner: u32,
         vertices: [u32; 3],

@@ -14,7 +14,7 @@ const POINT: u32 = 15;
 const LINES: [u32; 2] = [1, 8];
 const TRIANGLES: [u32; 2] = [2, 9];
 const TETRAHEDRA: [u32; 2] = [4, 11];
-/// The place of each middle of a tetrahedron's edges: Gmsh has the last two the other way round.
+/// Order of the midpoints of a tetrahedron: Gmsh exchanges the last two.
 const MIDDLES: [usize; 6] = [0, 1, 2, 3, 5, 4];
 
 sort_record! {
@@ -35,15 +35,15 @@ sort_record! {
     }
 }
 
-/// What the elements of a file are written with.
+/// The elements of a file being written.
 struct Elements<'a> {
     out: &'a mut Out,
-    /// Of each entity dimension, tag and number of elements.
+    /// Dimension, tag and number of elements of each entity.
     tags: Vec<(u32, u32, u64)>,
     order: usize,
     /// Elements before the first tetrahedron.
     n_faces: u64,
-    /// Vertices before the first middle.
+    /// Vertices before the first midpoint.
     n_vertices: u64,
     edges: Option<ElementEdges<6>>,
     /// The entity whose elements are being written.
@@ -124,7 +124,7 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Embedded edges, those of each label as a curve, numbered behind `n_before` other elements.
+/// Writes embedded edges, those of each label as a curve, numbered after `n_before` other elements.
 fn lines(
     mesh: &Merged,
     out: &mut Out,
@@ -151,7 +151,7 @@ fn lines(
 }
 
 impl Elements<'_> {
-    /// Begins the elements of an entity, unless they are begun.
+    /// Begins the elements of an entity, unless it is the current one.
     fn begin(&mut self, entity: u32, types: [u32; 2]) -> Result<()> {
         if self.entity.replace(entity) == Some(entity) {
             return Ok(());

@@ -1,4 +1,4 @@
-//! Labels and regions, and what of them lies in which partition.
+//! Entities: labels and regions, and their parts in the partitions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,25 +13,27 @@ use super::piece::GmshPiece;
 /// The least and the greatest coordinates.
 type Bounds = [[f64; 3]; 2];
 
-/// What is written: of each label and region, the elements in each partition. The place of an entity counts surfaces, then volumes.
+/// The entities of a file: for each label and region, the elements in each partition. The place of an entity counts surfaces, then volumes.
 ///
-/// A label behind all others is the faces towards a sub-domain; where that is written too, they have no physical group and lie in both partitions.
+/// A label behind all others stands for the faces towards a sub-domain. Where that sub-domain is written too, these faces have no physical group
+/// and lie in both partitions.
 pub(super) struct Entities {
-    /// Label and rank, ascending, and how many faces.
+    /// Label and rank, ascending, and the number of faces.
     surfaces: Vec<((u32, u32), u64)>,
-    /// Region and rank, ascending, and how many tetrahedra.
+    /// Region and rank, ascending, and the number of tetrahedra.
     volumes: Vec<((u32, u32), u64)>,
-    /// Of all that is written; it bounds every entity, if not closely.
+    /// Bounds of the whole file, which every entity gets.
     bounds: Bounds,
     /// Ranks of all partitions, also of those in other files.
     ranks: Vec<u32>,
     n_labels: u32,
-    /// Edges are in a curve for each label, each point is an entity of its own, numbered from 1. None in a file of one partition.
+    /// Embedded edges and points: edges are in a curve for each label, each point is an entity of its own, numbered from 1. A file of one
+    /// partition has none.
     pub wires: WrittenEmbedded,
 }
 
 impl Entities {
-    /// Counts those of a file. Errors: damage, the disk.
+    /// Counts the entities of a file. Errors: damage, the disk.
     pub fn gather(mesh: &mut Merged, piece: &GmshPiece) -> Result<Self> {
         let parts = mesh.parts();
         let mut entities = Self {
@@ -110,7 +112,7 @@ impl Entities {
         found.ok().map(|place| place as u32)
     }
 
-    /// The place of a region's volume in a partition, which has tetrahedra of it.
+    /// The place of a region's volume in a partition, which must have tetrahedra of the region.
     pub fn volume(&self, region: u32, rank: u32) -> u32 {
         let found = self.volumes.binary_search_by_key(&(region, rank), |v| v.0);
         let place = found.expect("regions were counted from the same tetrahedra");
@@ -126,7 +128,7 @@ impl Entities {
         }
     }
 
-    /// Dimension and tag of the entity at each place, and how many elements it has.
+    /// Dimension, tag and number of elements of the entity at each place.
     pub fn tags(&self) -> Vec<(u32, u32, u64)> {
         let whole = |all: &[((u32, u32), u64)]| all.last().map_or(0, |(key, _)| key.0 + 1);
         let first = whole(&self.surfaces).max(whole(&self.volumes)) + 1;
@@ -139,7 +141,7 @@ impl Entities {
         (0..).zip(parts).map(tag).collect()
     }
 
-    /// Those with a physical group.
+    /// The labels with a physical group.
     fn labels(&self) -> BTreeSet<u32> {
         let labels = self.surfaces.iter().map(|(key, _)| key.0);
         labels.filter(|&label| self.neighbor(label).is_none()).collect()
@@ -173,7 +175,7 @@ impl Entities {
         self.bounds.iter().flatten().for_each(|&x| out.double(x));
     }
 
-    /// Labels and regions as surfaces and volumes: tag, bounds, physical tag; what bounds them is not listed.
+    /// Writes labels and regions as surfaces and volumes: tag, bounds, physical tag, no bounding entities.
     pub fn write_model(&self, out: &mut Out) -> Result<()> {
         let (labels, regions) = (self.labels(), self.regions());
         let curves = self.wires.edge_labels();
@@ -201,7 +203,7 @@ impl Entities {
         Ok(())
     }
 
-    /// What of them is in which partition.
+    /// Writes the parts of labels and regions in the partitions.
     pub fn write_partitioned(&self, out: &mut Out, ghosts: bool) -> Result<()> {
         out.size(self.ranks.len() as u64);
         let tags = self.tags();
@@ -220,7 +222,7 @@ impl Entities {
         let (surfaces, volumes) = tags.split_at(self.surfaces.len());
         for ((_, tag, _), ((label, rank), _)) in surfaces.iter().zip(&self.surfaces) {
             match self.neighbor(*label) {
-                // Faces between partitions lie in a volume, which of the regions there matters to nobody.
+                // Faces between partitions lie in a volume; any region will do.
                 Some(other) => {
                     let region = self.regions().first().copied().unwrap_or_default();
                     self.put(out, [*tag, 3, region], &[*rank, other], None)?;
@@ -234,7 +236,7 @@ impl Entities {
         Ok(())
     }
 
-    /// An entity of partitions: its tag, dimension and tag of what it is a part of, ranks, physical group.
+    /// Writes an entity of partitions: its tag, dimension and tag of its parent, ranks, physical group.
     fn put(
         &self,
         out: &mut Out,

@@ -1,8 +1,9 @@
 //! Gmsh 4.1, binary or text, of first or second order: physical surfaces are labels, physical volumes regions.
 //!
-//! Of several sub-domains each is a partition, numbered from 1, whose part of a label or region is an entity of its own below the label's or
-//! region's. Elements are numbered from 1, triangles first; all numbers are those of the whole, also in files of one partition, named
-//! `NAME_1.msh` and so on. The faces between two partitions, each once, lie in both and have no physical group. Each vertex stands with the first entity it is on, surfaces before volumes.
+//! Where there are several sub-domains, each is a partition, numbered from 1. Its part of a label or region is an entity below that of the label
+//! or region. Elements are numbered from 1, triangles first. All numbers are those of the whole, also in files of one partition, named
+//! `NAME_1.msh` and so on. The faces between two partitions are listed once, lie in both and have no physical group. Each vertex belongs to
+//! its first entity, surfaces before volumes.
 //! Source: the Gmsh reference manual, "MSH file format".
 
 mod elements;
@@ -25,7 +26,7 @@ use ghosts::Ghosts;
 use out::Out;
 use piece::GmshPiece;
 
-/// Writes one file of all, or one of each partition.
+/// Writes one file of the whole mesh, or one of each partition.
 pub(super) fn write(
     mesh: &mut Merged,
     outputs: &mut OutputFiles,
@@ -55,7 +56,7 @@ pub(super) fn write(
     Ok(counts)
 }
 
-/// `NAME_1.msh` of the first sub-domain, as Gmsh itself calls the files of partitions.
+/// `NAME_1.msh` for the first sub-domain: Gmsh's own names for files of partitions.
 fn piece_path(out: &Path, rank: u32) -> PathBuf {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
     let ending = out.extension().unwrap_or_default().to_string_lossy();

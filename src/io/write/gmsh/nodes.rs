@@ -1,4 +1,4 @@
-//! Vertices by the entities they stand with.
+//! Vertices by their entities.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
 use tetdb_store::sealed::BitSet;
 
 sort_record! {
-    /// An entity that a vertex is on, or, behind all of these, where it is.
+    /// An entity that a vertex is on; the last record of a vertex has its position.
     struct VertexEntity {
         vertex: u64,
         /// [`POSITION`] for a position.
@@ -36,7 +36,7 @@ const POSITION: u32 = u32::MAX;
 /// The vertices of a file, sorted, in a scratch file.
 pub(super) struct Nodes {
     pub n: u64,
-    /// How many stand with each entity, by its place.
+    /// Number of vertices of each entity, by its place.
     counts: Vec<u64>,
     span: [u64; 2],
     path: PathBuf,
@@ -60,7 +60,7 @@ impl MetNumbers {
     }
 }
 
-/// Gives each vertex of a file, and each middle of an edge, its entity.
+/// Gives an entity to each vertex and each midpoint of a file.
 pub(super) fn gather(
     mesh: &mut Merged,
     piece: &GmshPiece,
@@ -75,7 +75,7 @@ pub(super) fn gather(
     stored(nodes, entities, dir.join(format!("nodes-{file}")))
 }
 
-/// What faces, tetrahedra and ghosts of the piece say of their vertices and midpoints, by vertex.
+/// The entities of vertices and midpoints by faces, tetrahedra and ghosts of the piece, sorted by vertex.
 fn claims(
     mesh: &mut Merged,
     piece: &GmshPiece,
@@ -107,7 +107,7 @@ fn claims(
         let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
         let rank = parts[p].rank;
         let only = entities.only_volume(rank);
-        // Inside, all tetrahedra around a vertex are of one region, so that the first one tells it.
+        // All tetrahedra around an inner vertex are of one region, so the first one decides.
         let mut vertices = MetNumbers::new(parts[p].first_vertex, parts[p].n_vertices);
         let of_edges = piece.midpoints.map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
         let mut midpoints = MetNumbers::new(n_vertices + of_edges.0, of_edges.1);
@@ -159,7 +159,7 @@ fn claims(
     Ok(claims.finish()?)
 }
 
-/// The first claim of each vertex, which is the strongest, with its position; by entity.
+/// The first entity of each vertex, with its position, sorted by entity.
 fn granted(
     claims: Sorted<VertexEntity>,
     n_vertices: u64,
@@ -178,7 +178,7 @@ fn granted(
             }
             _ => {
                 last = Some((claim.vertex, claim.entity));
-                // Nobody claims the positions of midpoints: they stand in the order of their numbers.
+                // Midpoints have no record of their position: the positions are in the order of their numbers.
                 let edge = claim.vertex.checked_sub(n_vertices);
                 if let (Some(points), Some(edge)) = (&mut *points, edge) {
                     sorter.push(EntityNode {
@@ -193,7 +193,7 @@ fn granted(
     Ok(sorter.finish()?)
 }
 
-/// Counts them and puts them into a file at `path`.
+/// Counts the vertices and saves them at `path`.
 fn stored(sorted: Sorted<EntityNode>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
     let mut nodes =
         Nodes { n: 0, counts: vec![0; entities.tags().len()], span: [u64::MAX, 0], path };
@@ -208,7 +208,7 @@ fn stored(sorted: Sorted<EntityNode>, entities: &Entities, path: PathBuf) -> Res
 }
 
 impl Nodes {
-    /// Writes them entity by entity: first the tags of its vertices, then where they are.
+    /// Writes the vertices entity by entity: first their tags, then their positions.
     pub fn write(&self, out: &mut Out, entities: &Entities) -> Result<()> {
         let blocks = self.counts.iter().filter(|&&n| n > 0).count() as u64;
         for n in [blocks, self.n, self.span[0], self.span[1]] {

@@ -1,7 +1,7 @@
 //! MFEM 1.3: the whole as one file, or `NAME.000000` and so on, one for each process of MPI.
 //!
 //! Attributes are regions, boundary attributes label + 1; both have their names as sets. Faces between two filled regions are boundary elements
-//! too, as MFEM allows. A part is a mesh of its own with the numbers of the store, followed by what it shares with others (`shared`).
+//! too, as MFEM allows. A part is a mesh of its own with the numbers of the store, followed by the entities it shares with others (`shared`).
 //! Source: MFEM's documentation, "Mesh formats"; the sections of parallel meshes as `ParMesh` prints and reads them.
 
 mod lines;
@@ -22,7 +22,7 @@ use shared::Shared;
 use tetdb_schema::record::{NO_TET, SealedFacet};
 use tetdb_store::sealed::Subdomain;
 
-/// Writes one file of all, or one of each sub-domain.
+/// Writes one file of the whole mesh, or one of each sub-domain.
 pub(super) fn write(
     mesh: &mut Merged,
     outputs: &mut OutputFiles,
@@ -76,7 +76,7 @@ fn write_serial(
     Ok(counts)
 }
 
-/// A sub-domain; `end` writes what follows the mesh.
+/// Writes a sub-domain; `end` writes the sections after the mesh.
 fn write_part(
     (opened, support_first): (&mut OpenedPart, u64),
     outputs: &mut OutputFiles,
@@ -112,7 +112,7 @@ fn write_part(
     Ok(counts)
 }
 
-/// The input triangles that are this sub-domain's to list: those whose filled side, or front where both are filled, is here. Returns how many.
+/// Calls `each` with the input triangles whose filled side, or front where both are filled, is in this sub-domain. Returns their number.
 fn each_facet(
     part: &mut Subdomain,
     support_first: u64,
@@ -130,7 +130,7 @@ fn each_facet(
     Ok(n)
 }
 
-/// The vertices counter-clockwise seen from outside the tetrahedron that the face is of: the one in front, where there is one.
+/// The vertices counter-clockwise seen from outside the tetrahedron in front, or behind where the front is empty.
 fn outward([a, b, c]: [u64; 3], regions: [u32; 2]) -> [u64; 3] {
     if regions[0] == 0 { [a, b, c] } else { [a, c, b] }
 }
@@ -163,7 +163,7 @@ fn label_sets(mesh: &Merged) -> String {
     sets(labels.map(|(label, name)| (label + 1, name)))
 }
 
-/// Named sets of attributes; what has the same name is one set.
+/// Named sets of attributes; attributes of one name are one set.
 fn sets(named: impl Iterator<Item = (u32, String)>) -> String {
     let mut by_name = BTreeMap::<String, Vec<String>>::new();
     for (attribute, name) in named {

@@ -1,8 +1,8 @@
-//! Vertices, edges and faces that several sub-domains have, in groups by who has them.
+//! Vertices, edges and faces that several sub-domains have, in groups by these sub-domains.
 //!
-//! What is shared lies on the boundary of each that has it: the corners, edges and faces of input triangles and interface faces, sorted by the
-//! numbers of their vertices in the whole, meet those of the others. So every side lists them alike, and begins each edge and face at the same
-//! vertex.
+//! Shared entities lie on the boundary of each of their sub-domains. The corners, edges and faces of input triangles and interface faces are
+//! sorted by the numbers of their vertices in the whole, so that equal ones meet. Every side lists them in this order, and begins each edge and
+//! face at the same vertex.
 
 use std::collections::BTreeMap;
 
@@ -17,16 +17,16 @@ use tetdb_store::sealed::MergeReader;
 sort_record! {
     /// A vertex, an edge or a face on the boundary of a sub-domain.
     struct Entity {
-        /// Numbers of its vertices in the whole, ascending, the last one as often as it takes.
+        /// Numbers of its vertices in the whole, ascending; the last one is repeated to fill three places.
         key: [u64; 3],
         part: u32,
-        /// The same in the sub-domain.
+        /// Numbers of the vertices in the sub-domain, parallel to `key`.
         locals: [u32; 3],
     }
 }
 
 sort_record! {
-    /// One that is shared, as one of those that have it lists it.
+    /// A shared entity as one of its sub-domains lists it.
     struct SharedMember {
         part: u32,
         group: u32,
@@ -37,7 +37,7 @@ sort_record! {
     }
 }
 
-/// Those on the boundaries of all sub-domains, each as often as one has it, equal ones together.
+/// The entities on the boundaries of all sub-domains, equal ones next to each other.
 fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
     let mut entities = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     for p in 0..mesh.n_parts() {
@@ -69,7 +69,7 @@ fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
     Ok(entities.finish()?)
 }
 
-/// All that is shared.
+/// All shared entities.
 pub(super) struct Shared {
     members: MergeReader<SharedMember>,
     /// Places of the sub-domains of each group.
@@ -79,7 +79,7 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    /// Finds it. Errors: damage, the disk.
+    /// Finds the shared entities. Errors: damage, the disk.
     pub fn gather(mesh: &mut Merged) -> Result<Self> {
         let (mut entities, mut all) = (MergeReader::new(entities(mesh)?), Vec::new());
         let mut members = Sorter::new(mesh.dir(), mesh.sorter_bytes());
@@ -108,10 +108,10 @@ impl Shared {
         Ok(Self { members, groups, counts })
     }
 
-    /// Writes what the sub-domain at place `p` shares; later calls are for later ones. Errors: the disk.
+    /// Writes the shared entities of the sub-domain at place `p`; later calls are for later sub-domains. Errors: the disk.
     pub fn write(&mut self, p: u32, stream: &mut Stream) -> Result<()> {
         let groups: Vec<_> = self.counts.range((p, 0)..(p + 1, 0)).collect();
-        // The first group is what the sub-domain has alone.
+        // The first group is the sub-domain alone.
         stream.text(&format!(
             "\ncommunication_groups\nnumber_of_groups {}\n\n1 {p}\n",
             groups.len() + 1

@@ -38,7 +38,7 @@ sort_record! {
     struct SharedVertex {
         part: u32,
         local: u32,
-        /// The same for all parts that have it.
+        /// Equal for all parts that have the vertex.
         group: u64,
         /// Another part numbers it.
         is_elsewhere: bool,
@@ -49,7 +49,7 @@ sort_record! {
     /// A group's number, or a part that needs it.
     struct GroupMember {
         group: u64,
-        /// Not the one that numbers it, which comes first.
+        /// False for the part that numbers the group, which comes first.
         is_elsewhere: bool,
         part: u32,
         local: u32,
@@ -79,7 +79,7 @@ pub(super) struct Source {
 }
 
 impl Source {
-    /// What is written of it, unless it is all. Errors: the disk.
+    /// The written subset; `None` stands for all. Errors: the disk.
     pub fn subset(&self) -> Result<Option<Subset>> {
         let load = |path| Subset::load(path, self.row.tets);
         self.subset.as_deref().map(load).transpose()
@@ -107,7 +107,7 @@ pub(super) struct Numbering {
 ///
 /// Shape: `locals`, ascending, are numbered elsewhere, as `numbers[i]`; all others follow `first`.
 pub(super) struct PartNumbers {
-    /// Its file and sub-domain.
+    /// File and rank of the sub-domain.
     place: (PathBuf, u32),
     first: u64,
     locals: Vec<u32>,
@@ -115,7 +115,7 @@ pub(super) struct PartNumbers {
     n_locals: u32,
     /// Number of the first tetrahedron.
     pub first_tet: u64,
-    /// What is written, unless it is all.
+    /// The written subset; `None` stands for all.
     subset: Option<Subset>,
 }
 
@@ -368,7 +368,7 @@ impl ShareableVertex {
     }
 }
 
-/// Carries each group's number to the parts that share it, and writes the tables one after the other.
+/// Gives each group's number to its other parts, and writes the tables of all parts one after the other.
 fn carry(groups: Sorted<GroupMember>, dir: &Path, memory: usize, table: &Path) -> Result<()> {
     let mut sorter = Sorter::new(dir, memory as u64 / 4);
     let mut number = 0;

@@ -10,7 +10,7 @@ use crate::write::error::Result;
 use crate::write::hdf5::{self, Hdf5Object};
 use crate::write::stream::Strip;
 
-/// Where an array belongs.
+/// The group of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Group {
     PointData,

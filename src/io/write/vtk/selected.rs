@@ -15,7 +15,7 @@ use tetdb_base::storage::{Payload, sort_record};
 /// A tetrahedron to be written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SelectedTet {
-    /// Its lasting id as a number.
+    /// Lasting id as a number.
     pub id: u64,
     /// Rank of its sub-domain.
     pub subdomain: u32,
