@@ -69,7 +69,7 @@ fn write_share(
 ) -> Result<Vec<Exported>, Failure> {
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let format = match &args.format {
-        Some(word) => Some(MeshFormat::of_word(word).ok_or_else(|| {
+        Some(word) => Some(MeshFormat::from_word(word).ok_or_else(|| {
             Failure::new("unknown-format", "no format has this name")
                 .at(word)
                 .help(format!("choose msh22, or an ending without its dot: {ENDINGS}"))
@@ -173,7 +173,7 @@ fn rows(args: &ExportArgs) -> Result<Option<QueryArgs>, Failure> {
 
 /// Refuses names whose format cannot be told, before any work.
 pub fn check_format(out: &Path) -> Result<(), Failure> {
-    match MeshFormat::of_extension(out) {
+    match MeshFormat::from_extension(out) {
         Some(_) => Ok(()),
         None => Err(Failure::new(
             "unknown-format",

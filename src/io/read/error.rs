@@ -26,7 +26,7 @@ pub enum Spot {
 
 impl FilePlace {
     /// A file as a whole.
-    pub(super) fn of_file(path: &std::path::Path) -> Self {
+    pub(super) fn new(path: &std::path::Path) -> Self {
         Self { file: path.to_string_lossy().into_owned(), spot: Spot::File }
     }
 

@@ -68,7 +68,7 @@ pub enum Format {
 
 impl Format {
     /// The format of a file name's extension; a final `.gz` or `.zst` is skipped.
-    pub fn of_extension(path: &Path) -> Option<Self> {
+    pub fn from_extension(path: &Path) -> Option<Self> {
         let path = unpacked_name(path);
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         Some(match extension.as_str() {
@@ -86,7 +86,7 @@ impl Format {
     }
 
     /// The format of a file's first bytes, for names without a known extension.
-    fn of_head(head: &[u8], length: u64) -> Option<Self> {
+    fn from_head(head: &[u8], length: u64) -> Option<Self> {
         let starts = |word: &str| {
             head.get(..word.len()).is_some_and(|h| h.eq_ignore_ascii_case(word.as_bytes()))
         };
@@ -153,7 +153,7 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
     let extent = (bounds.high - bounds.low).max_element();
     // Validation refuses surfaces of points alone.
     if extent > 0.0 && extent < EXTENT_MIN {
-        let place = FilePlace::of_file(paths.first().map_or(Path::new(""), |path| path));
+        let place = FilePlace::new(paths.first().map_or(Path::new(""), |path| path));
         return Err(place.refuse(ReadFault::Surface(SurfaceError::TooSmall { extent })));
     }
     Ok(surface)
@@ -190,16 +190,16 @@ fn unique(stem: &str, taken: &[String]) -> String {
 }
 
 fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
-    let place = FilePlace::of_file(path);
+    let place = FilePlace::new(path);
     if let Some(kind) = solid_model(path, b"") {
         return Err(place.refuse(ReadFault::SolidModel(kind)));
     }
     let mut feed = open(path, limit)?;
-    let format = match Format::of_extension(path) {
+    let format = match Format::from_extension(path) {
         Some(format) => format,
         None => {
             let (length, head) = (feed.len, feed.head()?);
-            let found = Format::of_head(head, length);
+            let found = Format::from_head(head, length);
             let kind = solid_model(path, head);
             found.ok_or_else(|| place.refuse(kind.map_or(UNKNOWN_FORMAT, ReadFault::SolidModel)))?
         }

@@ -101,7 +101,7 @@ fn within(from: Reader, path: &Path, limit: u64) -> Result<Vec<u8>> {
     if bytes.len() as u64 > limit {
         let (what, needed) = ("the unpacked file", bytes.len() as u64);
         let fault = ReadFault::TooLarge { what, needed, limit };
-        return Err(FilePlace::of_file(path).refuse(fault));
+        return Err(FilePlace::new(path).refuse(fault));
     }
     Ok(bytes)
 }
@@ -120,5 +120,5 @@ pub(super) fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
 }
 
 fn unreadable(path: &Path, reason: impl ToString) -> ReadError {
-    FilePlace::of_file(path).refuse(ReadFault::Unreadable(reason.to_string()))
+    FilePlace::new(path).refuse(ReadFault::Unreadable(reason.to_string()))
 }

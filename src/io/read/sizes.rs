@@ -28,7 +28,7 @@ pub fn size_files(path: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
         let all = endings.map(|e| path.with_extension(e));
         all.into_iter().find(|p| p.is_file())
     };
-    let refuse = |fault| Err(FilePlace::of_file(path).refuse(fault));
+    let refuse = |fault| Err(FilePlace::new(path).refuse(fault));
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     match extension.to_ascii_lowercase().as_str() {
         "sol" => Ok((path.to_owned(), beside(["mesh", "meshb"]))),
@@ -74,7 +74,7 @@ pub fn read_sizes(path: &Path, limit: u64) -> Result<FileSizes> {
         return Ok(FileSizes::AtVertices(h));
     }
     if h.len() != points.len() {
-        return Err(FilePlace::of_file(&sizes).refuse(ReadFault::CountMismatch {
+        return Err(FilePlace::new(&sizes).refuse(ReadFault::CountMismatch {
             what: "sizes",
             declared: h.len().to_string(),
             found: format!("{} vertices in {}", points.len(), mesh_path.display()),

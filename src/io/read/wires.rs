@@ -31,7 +31,7 @@ pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
         _ => {
             let help =
                 "edges are read from .obj, .vtk and .poly, points from .csv, .node, .obj and .vtk";
-            return Err(FilePlace::of_file(path).refuse(ReadFault::UnknownFormat(help)));
+            return Err(FilePlace::new(path).refuse(ReadFault::UnknownFormat(help)));
         }
     }
     let set = sink.set;
@@ -43,7 +43,7 @@ pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
         return Ok(set);
     }
     let (expected, found) = (expected.to_owned(), "none".to_owned());
-    Err(FilePlace::of_file(path).refuse(ReadFault::Unexpected { expected, found }))
+    Err(FilePlace::new(path).refuse(ReadFault::Unexpected { expected, found }))
 }
 
 /// Lines of three numbers, and a name behind them; between them commas, semicolons or blanks. A first line of words is a heading.

@@ -85,7 +85,7 @@ impl FaceSorter {
         let face = BoundaryFace {
             key: f.triangle,
             is_second: side != preferred,
-            vertices: part.numbers.of(f.vertices)?,
+            vertices: part.numbers.vertices(f.vertices)?,
             label: f.label,
             regions,
             tet,
@@ -108,7 +108,7 @@ impl FaceSorter {
         let face = BoundaryFace {
             key: INTERFACE | u64::from(f.cut) << 32 | u64::from(f.index),
             is_second: false,
-            vertices: part.numbers.of(f.vertices)?,
+            vertices: part.numbers.vertices(f.vertices)?,
             label,
             regions: [0, 0],
             tet,

@@ -79,12 +79,12 @@ const FORMATS: &[(&str, MeshFormat, u16)] = {
 
 impl MeshFormat {
     /// The format of a file name's extension.
-    pub fn of_extension(path: &Path) -> Option<Self> {
-        Self::of_word(&path.extension()?.to_str()?.to_ascii_lowercase())
+    pub fn from_extension(path: &Path) -> Option<Self> {
+        Self::from_word(&path.extension()?.to_str()?.to_ascii_lowercase())
     }
 
     /// The format of this word: an ending without its dot, or `msh22`.
-    pub fn of_word(word: &str) -> Option<Self> {
+    pub fn from_word(word: &str) -> Option<Self> {
         let row = FORMATS.iter().find(|row| row.0 == word)?;
         Some(row.1)
     }

@@ -425,7 +425,7 @@ impl<'a> Merged<'a> {
                     let (mut quality, mut excess) = (f64::NAN, f64::NAN);
                     if measured != Measured::Nothing {
                         let points = part.corners(tet.nodes)?.map(|c| c.point);
-                        quality = Shape::of(points).quality;
+                        quality = Shape::new(points).quality;
                         if let Some(on_surface) = &mut on_surface {
                             let faces = on_surface.faces_of(local, tet.nodes)?;
                             excess = match faces.contains(&true) {
@@ -434,7 +434,7 @@ impl<'a> Merged<'a> {
                             };
                         }
                     }
-                    let mut nodes = numbers.of(tet.nodes)?;
+                    let mut nodes = numbers.vertices(tet.nodes)?;
                     if let Some(changes) = &mut changes {
                         changes.apply(number, &mut nodes)?;
                     }

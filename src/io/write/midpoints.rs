@@ -144,7 +144,7 @@ impl<const N: usize> ElementEdges<N> {
     }
 
     /// The edge numbers of the element with this number. Errors: the disk.
-    pub fn of(&mut self, element: u64) -> Result<[u64; N]> {
+    pub fn element(&mut self, element: u64) -> Result<[u64; N]> {
         self.records.seek(self.first + N as u64 * element)?;
         self.next()
     }
@@ -155,7 +155,7 @@ pub(super) struct MidpointReader(RecordReader<Position>);
 
 impl MidpointReader {
     /// The midpoint of the edge with this number. Errors: the disk.
-    pub fn of(&mut self, edge: u64) -> Result<[f64; 3]> {
+    pub fn at(&mut self, edge: u64) -> Result<[f64; 3]> {
         self.0.seek(edge)?;
         self.next().expect("every edge has its midpoint")
     }

@@ -170,7 +170,7 @@ fn check_regions(store: &mut Catalog, selection: &ExportSelection) -> Result<()>
 pub fn check(out: &Path, selection: &ExportSelection) -> Result<MeshFormat> {
     let path = || out.to_owned();
     let known = ENDINGS;
-    let named = selection.format.or_else(|| MeshFormat::of_extension(out));
+    let named = selection.format.or_else(|| MeshFormat::from_extension(out));
     let format = named.ok_or_else(|| WriteError::UnknownFormat { path: path(), known })?;
     let stdout = out == Path::new(STDOUT);
     let (pieces, regions) = (selection.pieces, !selection.regions.is_empty());

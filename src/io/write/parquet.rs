@@ -157,7 +157,7 @@ impl Tets {
             self.ids.push(id.number() as i64);
             self.regions.push(tet.region as i32);
             let points = corners.map(|c| c.point);
-            let shape = Shape::of(points);
+            let shape = Shape::new(points);
             let [x, y, z] = (points.iter().copied().sum::<Point>() * 0.25).to_array();
             let numbers = [shape.quality, shape.volume, x, y, z];
             for (column, number) in self.numbers.iter_mut().zip(numbers) {

@@ -68,7 +68,7 @@ pub fn qualities(store: &mut Catalog, memory_bytes: usize) -> Result<Qualities, 
             let chunk = part.tet_chunk(chunk as u32)?;
             for (t, tet) in (chunk.first..).zip(&chunk.records) {
                 let corners = part.corners(tet.nodes)?;
-                let quality = Shape::of(corners.map(|c| c.point)).quality;
+                let quality = Shape::new(corners.map(|c| c.point)).quality;
                 found.all.add(quality);
                 if forced.contains(t.into()) || corners.iter().all(|c| c.input_index().is_some()) {
                     found.forced.add(quality);

@@ -18,16 +18,16 @@ const LISTED_MAX: usize = 1000;
 pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
     let mut found = DamageFound(Vec::new());
     for row in store.subdomains()? {
-        found.of_part(store, row)?;
+        found.add_part(store, row)?;
     }
-    found.of_snapshots(store)?;
+    found.add_snapshots(store)?;
     Ok(found.0)
 }
 
 /// Lists the damage in the files that are no part of the mesh. Errors: as [`damage`].
-pub(super) fn damage_of_snapshots(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
+pub(super) fn snapshot_damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
     let mut found = DamageFound(Vec::new());
-    found.of_snapshots(store)?;
+    found.add_snapshots(store)?;
     Ok(found.0)
 }
 
@@ -64,20 +64,20 @@ impl DamageFound {
         Ok(is_sound)
     }
 
-    fn of_snapshots(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
+    fn add_snapshots(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
         for row in store.coarse_snapshots()? {
-            self.of_snapshot(store, row)?;
+            self.add_snapshot(store, row)?;
         }
         for row in store.previous()? {
-            self.of_part(store, row)?;
+            self.add_part(store, row)?;
         }
         for stage in store.stages()? {
-            self.of_part(store, stage.row)?;
+            self.add_part(store, stage.row)?;
         }
         Ok(())
     }
 
-    fn of_part(&mut self, store: &mut Catalog, row: SubdomainRow) -> Result<(), StoreError> {
+    fn add_part(&mut self, store: &mut Catalog, row: SubdomainRow) -> Result<(), StoreError> {
         let [tets, vertices, facets, faces, ..] = row.chunks;
         let mut part = match store.open_row(row, MEMORY_BYTES) {
             Ok(part) => part,
@@ -94,17 +94,17 @@ impl DamageFound {
         Ok(())
     }
 
-    fn of_snapshot(&mut self, store: &mut Catalog, row: CoarseRow) -> Result<(), StoreError> {
-        let mut leaf = match store.open_coarse(row.rank, MEMORY_BYTES) {
-            Ok(leaf) => leaf,
+    fn add_snapshot(&mut self, store: &mut Catalog, row: CoarseRow) -> Result<(), StoreError> {
+        let mut snapshot = match store.open_coarse(row.rank, MEMORY_BYTES) {
+            Ok(snapshot) => snapshot,
             Err(error) => return self.note::<(), StoreError>(Err(error)).map(drop),
         };
-        let mut is_sound = self.all(leaf.vertices())?;
-        is_sound &= self.all(leaf.tets())?;
-        is_sound &= self.all(leaf.facets())?;
-        is_sound &= self.all(leaf.faces())?;
+        let mut is_sound = self.all(snapshot.vertices())?;
+        is_sound &= self.all(snapshot.tets())?;
+        is_sound &= self.all(snapshot.facets())?;
+        is_sound &= self.all(snapshot.faces())?;
         if is_sound {
-            self.note(leaf.check())?;
+            self.note(snapshot.check())?;
         }
         Ok(())
     }

@@ -68,14 +68,14 @@ struct PairSides {
 }
 
 impl CutPair {
-    fn of(row: &InterfaceRow) -> Self {
+    fn from_row(row: &InterfaceRow) -> Self {
         let &InterfaceRow { cut, low, high, .. } = row;
         Self { cut, low, high }
     }
 }
 
 impl SharedFaces {
-    fn of(row: &InterfaceRow) -> Self {
+    fn from_row(row: &InterfaceRow) -> Self {
         Self { count: row.faces, digest: Digest { lanes: row.digest } }
     }
 }
@@ -158,7 +158,7 @@ impl InterfaceAudit {
             compare_sides(&group, report);
         }
         let mut expected: BTreeMap<CutPair, SharedFaces> =
-            rows.iter().map(|row| (CutPair::of(row), SharedFaces::of(row))).collect();
+            rows.iter().map(|row| (CutPair::from_row(row), SharedFaces::from_row(row))).collect();
         for (pair, sides) in self.sides {
             let row = expected.remove(&pair);
             if sides[0] != sides[1] || row != Some(sides[0]) {

@@ -109,7 +109,7 @@ pub fn verify_part(
 /// Ends a verification with the checks of the whole mesh.
 fn end(store: &mut Catalog, audit: pass::Audit) -> Result<Report, StoreError> {
     // Kept snapshots and stages are no part of the mesh, but their damage must be found before they are needed.
-    if let Some(first) = damage::damage_of_snapshots(store)?.into_iter().next() {
+    if let Some(first) = damage::snapshot_damage(store)?.into_iter().next() {
         return Err(first);
     }
     let interfaces = store.interfaces()?;

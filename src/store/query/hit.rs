@@ -48,7 +48,7 @@ pub struct Hit {
 impl Hit {
     /// A hit with its shape measured.
     pub fn new(id: TetId, region: u32, vertices: [u64; 4], corners: [Point; 4]) -> Self {
-        Self { id, region, vertices, corners, shape: Shape::of(corners), on_surface: None }
+        Self { id, region, vertices, corners, shape: Shape::new(corners), on_surface: None }
     }
 
     /// The mean of its corners.

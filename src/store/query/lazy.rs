@@ -13,7 +13,7 @@ use tetdb_schema::record::SealedTet;
 
 use super::hit::Hit;
 use super::locate::{ChunkCandidate, Search, holds, leaders};
-use super::near::{Near, nearness};
+use super::near::{NearVertices, nearness};
 use super::session::{checked_chunk, vertex_chunk};
 use super::{QueryError, QuerySession};
 use crate::sealed::Subdomain;
@@ -29,20 +29,20 @@ struct Waiting {
 }
 
 /// A search for one point, with the chunks read so far.
-struct Lazy {
+struct LazySearch {
     point: Point,
     /// No vertex of a tetrahedron that holds the point is farther away.
     reach: f64,
     waiting: Vec<Waiting>,
     /// Chunks of vertices by sub-domain and number: their vertices near the point, and whether they are read.
-    chunks: IdMap<(u32, u32), (Near, bool)>,
+    chunks: IdMap<(u32, u32), (NearVertices, bool)>,
 }
 
-impl Lazy {
+impl LazySearch {
     /// Vertices of a chunk near the point, and whether the chunk is read.
-    fn near(&mut self, part: &Subdomain, chunk: u32) -> (Near, bool) {
+    fn near(&mut self, part: &Subdomain, chunk: u32) -> (NearVertices, bool) {
         let (p, reach) = (self.point, self.reach);
-        let new = || (Near::of(part, chunk as usize, p, reach), false);
+        let new = || (NearVertices::new(part, chunk as usize, p, reach), false);
         let key = (part.id().rank(), chunk);
         *self.chunks.entry(key).or_insert_with(new)
     }
@@ -96,7 +96,7 @@ impl QuerySession {
         search: &mut Search,
     ) -> Result<(), QueryError> {
         let reaches = candidates.iter().map(|c| c.reach);
-        let mut lazy = Lazy {
+        let mut lazy = LazySearch {
             point: search.point,
             reach: reaches.fold(0.0, f64::max),
             waiting: Vec::new(),
@@ -113,7 +113,11 @@ impl QuerySession {
     }
 
     /// Adds the tetrahedra of a chunk that may hold the point.
-    fn gather(&mut self, candidate: &ChunkCandidate, lazy: &mut Lazy) -> Result<(), QueryError> {
+    fn gather(
+        &mut self,
+        candidate: &ChunkCandidate,
+        lazy: &mut LazySearch,
+    ) -> Result<(), QueryError> {
         check_cancelled();
         let part = &mut self.part(candidate.rank)?.subdomain;
         if !is_led_near(part, candidate, lazy)? {
@@ -151,7 +155,7 @@ impl QuerySession {
     fn read_up_to(
         &mut self,
         most: f64,
-        lazy: &mut Lazy,
+        lazy: &mut LazySearch,
         search: &mut Search,
     ) -> Result<(), QueryError> {
         loop {
@@ -190,7 +194,7 @@ impl QuerySession {
 fn is_led_near(
     part: &mut Subdomain,
     candidate: &ChunkCandidate,
-    lazy: &mut Lazy,
+    lazy: &mut LazySearch,
 ) -> Result<bool, StoreError> {
     if lazy.reach == f64::INFINITY {
         return Ok(true);
@@ -218,7 +222,7 @@ fn is_led_near(
 }
 
 /// Returns whether the known bounds of its vertices let the tetrahedron hold the point.
-fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut Lazy) -> Result<bool, StoreError> {
+fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut LazySearch) -> Result<bool, StoreError> {
     let mut around = Aabb::EMPTY;
     for (v, chunk) in w.tet.nodes.into_iter().zip(w.chunks) {
         match bounds_near(part, v, chunk, lazy)? {
@@ -235,7 +239,7 @@ fn bounds_near(
     part: &mut Subdomain,
     v: u32,
     chunk: u32,
-    lazy: &mut Lazy,
+    lazy: &mut LazySearch,
 ) -> Result<Option<Aabb>, StoreError> {
     let (near, is_read) = lazy.near(part, chunk);
     let bounds = match is_read {

@@ -6,7 +6,7 @@ use tetdb_schema::ids::TetId;
 
 use super::decoded::Searched;
 use super::hit::Hit;
-use super::near::Near;
+use super::near::NearVertices;
 use super::session::{bounds_of, chunk_bounds, reach};
 use super::{QueryError, QuerySession};
 use crate::sealed::Subdomain;
@@ -187,7 +187,7 @@ fn leaders_nearness(part: &Subdomain, chunk: usize, p: Point) -> f64 {
     let first = part.vertex_chunk_of(leaders.start);
     let last = part.vertex_chunk_of(leaders.end.saturating_sub(1));
     (first..=last.max(first))
-        .map(|c| Near::of(part, c, p, f64::INFINITY).nearness)
+        .map(|c| NearVertices::new(part, c, p, f64::INFINITY).nearness)
         .fold(f64::INFINITY, f64::min)
 }
 

@@ -5,15 +5,15 @@ use tetdb_base::geom::{Aabb, Point};
 
 /// Vertices of a chunk near a point, as bounded by the summary of the chunk.
 #[derive(Clone, Copy)]
-pub(super) struct Near {
+pub(super) struct NearVertices {
     /// Distance of the nearest cell that has vertices; negative for a point in a cell, lower for a more central one.
     pub nearness: f64,
     /// Box around all places within reach that may have vertices; empty where there are none.
     pub bounds: Aabb,
 }
 
-impl Near {
-    pub(super) fn of(part: &Subdomain, chunk: usize, p: Point, reach: f64) -> Self {
+impl NearVertices {
+    pub(super) fn new(part: &Subdomain, chunk: usize, p: Point, reach: f64) -> Self {
         let mut near = Self { nearness: f64::INFINITY, bounds: Aabb::EMPTY };
         for cell in part.vertex_summaries()[chunk].cells() {
             let [low, high] = cell.map(Point::from_array);

@@ -65,15 +65,15 @@ pub struct OpenSubdomain {
 /// # tetdb::pipeline::mesh(&mut catalog, &surface, &options, &Budget::new(256 << 20), &|_| {})?;
 /// # catalog.close()?;
 ///
-/// let mut inquiry = QuerySession::open(Catalog::open(&path)?, &Budget::new(64 << 20))?;
+/// let mut session = QuerySession::open(Catalog::open(&path)?, &Budget::new(64 << 20))?;
 /// let center = Point::splat(0.5);
-/// let located = inquiry.locate(&[center, Point::splat(7.0)])?;
+/// let located = session.locate(&[center, Point::splat(7.0)])?;
 /// assert!(located[0].found.is_some() && located[1].found.is_none());
 ///
 /// let mut selection = Selection::default();
 /// selection.solids.push(Solid::Sphere { center, radius: 0.2 });
 /// selection.condition = Some(Expression::parse("quality < 3 and x > 0.1", &VARIABLES)?);
-/// for tet in inquiry.select(selection)? {
+/// for tet in session.select(selection)? {
 ///     assert!(tet?.shape.quality < 3.0);
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -116,7 +116,7 @@ impl QuerySession {
     /// Errors: damage; sub-domains that are not sealed; a budget below some ten MiB.
     pub fn open(mut store: Catalog, budget: &Budget) -> Result<Self, QueryError> {
         let rows = store.subdomains()?;
-        Self::of_rows(store, rows, budget)
+        Self::open_rows(store, rows, budget)
     }
 
     /// Opens questions to a mesh that was kept on its way.
@@ -134,12 +134,12 @@ impl QuerySession {
             return Err(QueryError::NoStage { cut, kept });
         };
         let normal = Point::from_array(row.normal);
-        let mut inquiry = Self::of_rows(store, vec![row.row.clone()], budget)?;
-        inquiry.cutting = Some([normal * row.offset, normal]);
-        Ok(inquiry)
+        let mut session = Self::open_rows(store, vec![row.row.clone()], budget)?;
+        session.cutting = Some([normal * row.offset, normal]);
+        Ok(session)
     }
 
-    fn of_rows(
+    fn open_rows(
         mut store: Catalog,
         rows: Vec<SubdomainRow>,
         budget: &Budget,
@@ -341,7 +341,7 @@ pub fn reach(part: &Subdomain, chunk: usize) -> f64 {
     /// Covers the rounding of lengths.
     const SLACK: f64 = 1.0 + 1e-6;
     match part.tet_summaries()[chunk].edge_max {
-        told if told > 0.0 => f64::from(told) * SLACK,
+        edge_max if edge_max > 0.0 => f64::from(edge_max) * SLACK,
         _ => f64::INFINITY,
     }
 }

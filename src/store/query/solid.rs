@@ -102,7 +102,7 @@ impl Solid {
 
 fn side(point: Point, normal: Point, c: Point) -> Ordering {
     fn sign<R: Ring>(point: Point, normal: Point, c: Point) -> Option<Ordering> {
-        Vector::<R>::between(point, c).dot(&Vector::of(normal)).sign()
+        Vector::<R>::between(point, c).dot(&Vector::from_point(normal)).sign()
     }
     sign::<Near>(point, normal, c)
         .or_else(|| sign::<Dyadic>(point, normal, c))
@@ -112,7 +112,7 @@ fn side(point: Point, normal: Point, c: Point) -> Ordering {
 fn is_within(center: Point, radius: f64, c: Point) -> bool {
     fn within<R: Ring>(center: Point, radius: f64, c: Point) -> Option<bool> {
         let to = Vector::<R>::between(center, c);
-        not_negative(&R::of(radius).times(&R::of(radius)).minus(&to.dot(&to)))
+        not_negative(&R::from_f64(radius).times(&R::from_f64(radius)).minus(&to.dot(&to)))
     }
     within::<Near>(center, radius, c)
         .or_else(|| within::<Dyadic>(center, radius, c))
@@ -131,7 +131,7 @@ fn ball_meets<R: Ring>(center: Point, radius: f64, corners: &[Point; 4]) -> Opti
     if FACES.iter().all(behind) {
         return Some(true);
     }
-    let square = R::of(radius).times(&R::of(radius));
+    let square = R::from_f64(radius).times(&R::from_f64(radius));
     let to: [Vector<R>; 4] = corners.map(|c| Vector::between(c, center));
     let mut doubt = false;
     let mut settle = |answer: Option<bool>| {

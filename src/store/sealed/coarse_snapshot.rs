@@ -43,7 +43,7 @@ impl CoarseWriter {
         Ok(Self {
             path: path.clone(),
             file: StoreFile::create_unsynced(path, memory_bytes / 2)?,
-            batch: Batch::of(memory_bytes),
+            batch: Batch::new(memory_bytes),
             rank,
             generation,
             vertices: Packer::new(rank, generation).map_err(io)?,

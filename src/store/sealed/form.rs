@@ -22,7 +22,7 @@ pub enum Form {
 
 impl Form {
     /// The form of a finished sub-domain; `None` for one that is not finished.
-    pub fn of(state: SubdomainState) -> Option<Self> {
+    pub fn from_state(state: SubdomainState) -> Option<Self> {
         match state {
             SubdomainState::Sealed => Some(Self::Sealed),
             SubdomainState::Optimized => Some(Self::Pages),
@@ -160,7 +160,7 @@ impl<R: ChunkRecord> Loader<R> {
 
 impl<R: PageRecord> Loader<R> {
     /// A loader of a sub-domain's records in either form. Errors: those of zstd.
-    pub fn of(form: Form, (subdomain, generation): (u32, u32)) -> std::io::Result<Self> {
+    pub fn new(form: Form, (subdomain, generation): (u32, u32)) -> std::io::Result<Self> {
         Ok(match form {
             Form::Sealed => Self::chunks()?,
             Form::Pages => Self::Pages {

@@ -22,11 +22,11 @@ pub struct Shape {
 impl Shape {
     /// Measures the positive tetrahedron with these corners. Unused results are not computed.
     #[inline]
-    pub fn of(corners: [Point; 4]) -> Self {
+    pub fn new(corners: [Point; 4]) -> Self {
         Self::with(corners, cosines)
     }
 
-    /// Like [`Shape::of`], but skips the six divisions of the cosines and returns `known` unless one may exceed these extremes.
+    /// Like [`Shape::new`], but skips the six divisions of the cosines and returns `known` unless one may exceed these extremes.
     #[inline]
     pub(super) fn beyond(corners: [Point; 4], known: [f64; 2]) -> Self {
         Self::with(corners, |normals, lengths| {
@@ -110,7 +110,7 @@ mod tests {
             // A hundredth are flat, some altogether.
             let flat = [1.0, 1e-9, 0.0][if k % 100 == 0 { k / 100 % 3 } else { 0 }];
             let p = [0; 4].map(|_| Point::new(next(), next(), flat * next()));
-            let (whole, beyond) = (Shape::of(p), Shape::beyond(p, known));
+            let (whole, beyond) = (Shape::new(p), Shape::beyond(p, known));
             let same = |f: fn(&Shape) -> f64| f(&whole).to_bits() == f(&beyond).to_bits();
             assert!(same(|s| s.volume) && same(|s| s.quality) && same(|s| s.edge_max));
             skipped += usize::from(beyond.cosines == known);
@@ -128,8 +128,8 @@ mod tests {
         let p = [[1., 1., 1.], [1., -1., -1.], [-1., 1., -1.], [-1., -1., 1.]];
         for scale in [1e-9, 1.0, 1e9] {
             let [a, b, c, d] = p.map(|p| Point::from_array(p) * scale);
-            let shape = Shape::of([a, c, b, d]);
-            let shape = if shape.volume > 0.0 { shape } else { Shape::of([a, b, c, d]) };
+            let shape = Shape::new([a, c, b, d]);
+            let shape = if shape.volume > 0.0 { shape } else { Shape::new([a, b, c, d]) };
             assert!((shape.quality - 1.0).abs() < 1e-12, "{shape:?}");
             assert!((shape.volume / scale.powi(3) - 8.0 / 3.0).abs() < 1e-12);
             for cosine in shape.cosines {

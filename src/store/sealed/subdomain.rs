@@ -55,7 +55,7 @@ impl Subdomain {
         memory_bytes: usize,
     ) -> Result<Self, SealedError> {
         let rank = row.rank;
-        let form = Form::of(row.state).ok_or_else(|| SealedError::NotSealed {
+        let form = Form::from_state(row.state).ok_or_else(|| SealedError::NotSealed {
             path: path.path().to_owned(),
             subdomain: rank,
         })?;
@@ -259,7 +259,7 @@ impl Subdomain {
         Chunks {
             address: address::<R>(&self.row),
             end: n_chunks::<R>(&self.row),
-            loader: Loader::of(self.form, (self.row.rank, self.row.generation))
+            loader: Loader::new(self.form, (self.row.rank, self.row.generation))
                 .expect("zstd makes a context whenever there is memory"),
             file: &mut self.file,
             expected: 0,

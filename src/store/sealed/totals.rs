@@ -47,7 +47,7 @@ struct VertexSum {
 
 impl VertexSum {
     #[inline(always)]
-    fn of(corner: &Corner) -> Self {
+    fn new(corner: &Corner) -> Self {
         Self { point: corner.point, mix: corner.mix }
     }
 }
@@ -59,7 +59,7 @@ struct RegionRun {
 }
 
 impl RegionRun {
-    fn of(region: u32, regions: &BTreeMap<u32, RegionTotals>) -> Self {
+    fn begin(region: u32, regions: &BTreeMap<u32, RegionTotals>) -> Self {
         let totals = regions.get(&region).copied().unwrap_or_default();
         Self { region, totals }
     }
@@ -160,10 +160,10 @@ impl Totals {
             for tet in piece {
                 let [a, b, c, d] = &corners_of(tet)?;
                 corners.push([
-                    VertexSum::of(a),
-                    VertexSum::of(b),
-                    VertexSum::of(c),
-                    VertexSum::of(d),
+                    VertexSum::new(a),
+                    VertexSum::new(b),
+                    VertexSum::new(c),
+                    VertexSum::new(d),
                 ]);
             }
             // Shapes in parallel, sums in order: the same for any number of threads.
@@ -172,7 +172,7 @@ impl Totals {
                 Shape::beyond([a.point, b.point, c.point, d.point], known)
             });
             let known = piece.iter().zip(&*corners).zip(&*shapes);
-            let mut run = RegionRun::of(piece[0].region, &self.regions);
+            let mut run = RegionRun::begin(piece[0].region, &self.regions);
             for (place, ((tet, corners), shape)) in (first..).zip(known) {
                 let [a, b, c, d] = corners;
                 self.digest.add_tet([a.mix, b.mix, c.mix, d.mix], tet.region, rank);
@@ -180,7 +180,7 @@ impl Totals {
                 self.add_shape(place, shape);
                 if run.region != tet.region {
                     run.end(&mut self.regions);
-                    run = RegionRun::of(tet.region, &self.regions);
+                    run = RegionRun::begin(tet.region, &self.regions);
                 }
                 run.totals.tets += 1;
                 run.totals.volume += shape.volume;

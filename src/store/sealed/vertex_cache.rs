@@ -106,7 +106,7 @@ impl VertexCache {
             resident: Vec::new(),
             vacant: Vec::new(),
             order: LruCache::unbounded(),
-            loader: Loader::of(form, (subdomain, generation))?,
+            loader: Loader::new(form, (subdomain, generation))?,
             scratch: Vec::new(),
             last: [ResidentChunk::EMPTY; 2],
             bytes: 0,

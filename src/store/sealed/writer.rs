@@ -107,7 +107,7 @@ impl SealedWriter {
             subdomain,
             generation,
             memory_bytes,
-            batch: Batch::of(memory_bytes),
+            batch: Batch::new(memory_bytes),
             form,
             vertices: Cutter::new(form, rank, generation).map_err(io)?,
             vertex_chunks: Vec::new(),

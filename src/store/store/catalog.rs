@@ -428,7 +428,7 @@ impl Catalog {
 
     /// Refuses a row that no sub-domain can have, before it is used.
     fn check_row(&self, row: &SubdomainRow) -> Result<(), StoreError> {
-        let is_finished = Form::of(row.state).is_some() && row.vertices > 0;
+        let is_finished = Form::from_state(row.state).is_some() && row.vertices > 0;
         let is_sound = is_box(&row.bounds) && !row.volume.is_nan() && !row.quality.worst.is_nan();
         let counts = [row.tets, row.vertices, row.facets, row.interface_faces];
         let reason = match !is_finished || is_sound {
@@ -532,7 +532,7 @@ impl Catalog {
     pub fn digest(&mut self) -> Result<[Digest; 2], StoreError> {
         let mut both = [Digest::default(); 2];
         for row in self.subdomains()? {
-            if Form::of(row.state).is_none() {
+            if Form::from_state(row.state).is_none() {
                 return Err(StoreError::Sealed(SealedError::NotSealed {
                     path: self.dir().to_owned(),
                     subdomain: row.rank,

@@ -188,7 +188,7 @@ impl ProcessorFiles<'_> {
             }
             // Both sides begin with the vertex that has the least number in the whole; its neighbor then goes round the other way.
             let [a, b, c] = face.vertices;
-            let [i, j, k] = numbers.of(face.vertices)?;
+            let [i, j, k] = numbers.vertices(face.vertices)?;
             let turned = match i.min(j).min(k) {
                 least if least == i => [a, b, c],
                 least if least == j => [b, c, a],
@@ -255,7 +255,7 @@ impl ProcessorFiles<'_> {
         })?;
         points.finish()?;
         write_labels(outputs, (&dir, "pointProcAddressing"), size.points, ascii, |file| {
-            (0..size.points as u32).try_for_each(|v| file.label(numbers.of([v])?[0] as i32))
+            (0..size.points as u32).try_for_each(|v| file.label(numbers.vertices([v])?[0] as i32))
         })?;
         write_labels(outputs, (&dir, "cellProcAddressing"), size.cells, ascii, |file| {
             (0..size.cells as u32).try_for_each(|cell| file.label((first_tet + cell) as i32))

@@ -114,7 +114,7 @@ fn write_faces(
         let faces = walk.part(mesh, p)?;
         let numbers = mesh.numbers_of(p)?;
         let first = numbers.first_tet as u32;
-        let global = |vertices| numbers.of(vertices).map(|v| v.map(|v| v as u32));
+        let global = |vertices| numbers.vertices(vertices).map(|v| v.map(|v| v as u32));
         in_order(faces.inner, faces.uppers, |face| {
             let (owner, neighbor, vertices, zone) = match face {
                 WithTwoCells::Here(f) => (f.owner, first + f.neighbor, f.vertices, f.zone),

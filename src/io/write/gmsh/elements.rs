@@ -84,7 +84,7 @@ pub(super) fn write(
             for tet in part.tets() {
                 let (id, tet) = tet?;
                 if let Some(number) = numbers.tet(id.local()) {
-                    elements.tet(entity, number, numbers.of(tet.nodes)?)?;
+                    elements.tet(entity, number, numbers.vertices(tet.nodes)?)?;
                 }
             }
         } else {
@@ -101,7 +101,7 @@ pub(super) fn write(
             }
             for tet in sorter.finish()? {
                 let tet = tet?;
-                elements.tet(tet.entity, tet.number, numbers.of(tet.nodes)?)?;
+                elements.tet(tet.entity, tet.number, numbers.vertices(tet.nodes)?)?;
             }
         }
         mesh.advance(part.row().tets as usize);
@@ -169,7 +169,7 @@ impl Elements<'_> {
         self.out.size(self.n_faces + number + 1);
         nodes.iter().for_each(|v| self.out.size(v + 1));
         if let Some(edges) = &mut self.edges {
-            let edges = edges.of(number)?;
+            let edges = edges.element(number)?;
             MIDDLES.iter().for_each(|&i| self.out.size(self.n_vertices + edges[i] + 1));
         }
         self.out.end()
@@ -198,7 +198,7 @@ fn triangles(
         elements.out.size(face.number + 1);
         face.vertices.iter().for_each(|v| elements.out.size(v + 1));
         if let Some(edges) = &mut edges {
-            for edge in edges.of(face.number)? {
+            for edge in edges.element(face.number)? {
                 elements.out.size(elements.n_vertices + edge + 1);
             }
         }

@@ -41,7 +41,7 @@ impl Ghosts {
             let mut shared: Vec<(u64, u32)> = Vec::new();
             let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
             while let Some(sharer) = sharers.next_if(|s| s.part as usize == p)? {
-                shared.push((numbers.of_dense(sharer.local), sharer.other));
+                shared.push((numbers.dense_vertex(sharer.local), sharer.other));
             }
             shared.sort_unstable();
             let rank = part.id().rank();
@@ -52,7 +52,7 @@ impl Ghosts {
                     let Some(number) = numbers.tet(local) else {
                         continue;
                     };
-                    let nodes = numbers.of(tet.nodes)?;
+                    let nodes = numbers.vertices(tet.nodes)?;
                     others.clear();
                     for v in nodes {
                         let from = shared.partition_point(|s| s.0 < v);

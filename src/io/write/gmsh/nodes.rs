@@ -94,7 +94,7 @@ fn claims(
                 claim(vertex, entity, [0.0; 3])?;
             }
             if let Some(edges) = &mut edges {
-                for edge in edges.of(number)? {
+                for edge in edges.element(number)? {
                     claim(n_vertices + edge, entity, [0.0; 3])?;
                 }
             }
@@ -118,13 +118,13 @@ fn claims(
                 continue;
             };
             let entity = entities.volume(tet.region, rank);
-            for v in numbers.of(tet.nodes)? {
+            for v in numbers.vertices(tet.nodes)? {
                 if vertices.is_new(v) {
                     claim(v, entity, [0.0; 3])?;
                 }
             }
             if let Some(edges) = &mut edges {
-                for v in edges.of(number)?.map(|edge| n_vertices + edge) {
+                for v in edges.element(number)?.map(|edge| n_vertices + edge) {
                     if midpoints.is_new(v) {
                         claim(v, entity, [0.0; 3])?;
                     }
@@ -150,7 +150,7 @@ fn claims(
             claim(v, POSITION, *point)?;
         }
         if let Some(edges) = &mut edges {
-            for edge in edges.of(ghost.number)? {
+            for edge in edges.element(ghost.number)? {
                 claim(n_vertices + edge, entity, [0.0; 3])?;
             }
         }
@@ -184,7 +184,7 @@ fn granted(
                     sorter.push(EntityNode {
                         entity: claim.entity,
                         vertex: claim.vertex,
-                        point: Payload(points.of(edge)?),
+                        point: Payload(points.at(edge)?),
                     })?;
                 }
             }

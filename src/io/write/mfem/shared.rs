@@ -43,7 +43,7 @@ fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
     for p in 0..mesh.n_parts() {
         let OpenedPart { mut part, numbers, .. } = mesh.open_part(p)?;
         let mut push = |face: [u32; 3]| -> Result<()> {
-            let [i, j, k] = numbers.of(face)?;
+            let [i, j, k] = numbers.vertices(face)?;
             let mut ends = [(i, face[0]), (j, face[1]), (k, face[2])];
             ends.sort_unstable();
             let [a, b, c] = ends;

@@ -124,9 +124,9 @@ impl PartNumbers {
     #[inline]
     pub fn vertex(&self, local: u32) -> Option<u64> {
         match &self.subset {
-            None if local < self.n_locals => Some(self.of_dense(local)),
+            None if local < self.n_locals => Some(self.dense_vertex(local)),
             None => None,
-            Some(subset) => Some(self.of_dense(subset.vertices.rank(local)?)),
+            Some(subset) => Some(self.dense_vertex(subset.vertices.rank(local)?)),
         }
     }
 
@@ -142,7 +142,7 @@ impl PartNumbers {
 
     /// The numbers of the vertices of a record that is written. Errors: damage, where the record names a vertex that is not written.
     #[inline]
-    pub fn of<const N: usize>(&self, locals: [u32; N]) -> Result<[u64; N]> {
+    pub fn vertices<const N: usize>(&self, locals: [u32; N]) -> Result<[u64; N]> {
         let mut numbers = [0; N];
         for (number, local) in numbers.iter_mut().zip(locals) {
             *number = self.vertex(local).ok_or_else(|| self.names(&locals))?;
@@ -158,7 +158,7 @@ impl PartNumbers {
 
     /// The number of a vertex that has this number among those of the part that are written.
     #[inline]
-    pub fn of_dense(&self, local: u32) -> u64 {
+    pub fn dense_vertex(&self, local: u32) -> u64 {
         if self.locals.is_empty() {
             return self.first + u64::from(local);
         }
@@ -403,8 +403,8 @@ mod tests {
             first_tet: 0,
             subset: None,
         };
-        assert_eq!(numbers.of([0, 1, 2, 3]).unwrap(), [10, 4, 11, 12]);
-        let error = numbers.of([0, 4, 2]).unwrap_err();
+        assert_eq!(numbers.vertices([0, 1, 2, 3]).unwrap(), [10, 4, 11, 12]);
+        let error = numbers.vertices([0, 4, 2]).unwrap_err();
         assert_eq!(error.code(), "damaged");
         let text = error.to_string();
         assert!(text.contains("a.redb") && text.contains("[0, 4, 2]"), "{text}");
