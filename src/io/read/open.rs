@@ -17,17 +17,17 @@ pub(super) type Reader = Box<dyn BufRead>;
 
 /// How the bytes of a file are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Packing {
+enum Compression {
     Gzip,
     Zstd,
 }
 
 /// The packing by the ending of a name, and the name without the ending.
-fn packing(path: &Path) -> Option<(Packing, PathBuf)> {
+fn packing(path: &Path) -> Option<(Compression, PathBuf)> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     let packing = match extension.as_str() {
-        "gz" => Packing::Gzip,
-        "zst" => Packing::Zstd,
+        "gz" => Compression::Gzip,
+        "zst" => Compression::Zstd,
         _ => return None,
     };
     Some((packing, path.with_extension("")))
@@ -66,11 +66,11 @@ fn is_pipe(_: &std::fs::Metadata) -> bool {
 pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
     let name = path.to_string_lossy();
     let unpack: Reader = match packing(path) {
-        Some((Packing::Gzip, _)) => {
+        Some((Compression::Gzip, _)) => {
             let (reader, _) = open_plain(path)?;
             Box::new(BufReader::new(flate2::bufread::MultiGzDecoder::new(reader)))
         }
-        Some((Packing::Zstd, _)) => {
+        Some((Compression::Zstd, _)) => {
             let (reader, _) = open_plain(path)?;
             let decoder = zstd::stream::read::Decoder::with_buffer(reader).and_then(|mut d| {
                 d.window_log_max(WINDOW_LOG_MAX)?;

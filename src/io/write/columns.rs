@@ -44,7 +44,7 @@ impl Number {
 }
 
 /// The entry of a row in a column: one number, or several of one type.
-pub(super) trait Cell {
+pub(super) trait CellValue {
     const NUMBER: Number;
     const COMPONENTS: u64;
     /// Writes the numbers, little end first.
@@ -53,7 +53,7 @@ pub(super) trait Cell {
 
 macro_rules! cells {
     ($($type:ty => $number:ident),*) => {$(
-        impl Cell for $type {
+        impl CellValue for $type {
             const NUMBER: Number = Number::$number;
             const COMPONENTS: u64 = 1;
 
@@ -67,7 +67,7 @@ macro_rules! cells {
 
 cells!(u8 => U8, i32 => I32, u32 => U32, i64 => I64, f64 => F64);
 
-impl<T: Cell, const N: usize> Cell for [T; N] {
+impl<T: CellValue, const N: usize> CellValue for [T; N] {
     const NUMBER: Number = T::NUMBER;
     const COMPONENTS: u64 = N as u64;
 
@@ -78,7 +78,7 @@ impl<T: Cell, const N: usize> Cell for [T; N] {
 }
 
 /// A column of rows of type `T`.
-pub(super) struct Column<T> {
+pub(super) struct TableColumn<T> {
     pub name: &'static str,
     pub number: Number,
     /// Numbers in a row.
@@ -89,11 +89,11 @@ pub(super) struct Column<T> {
 type Put<T> = dyn Fn(&T, &mut Strip) -> Result<()>;
 
 /// The column `name` with the `value` of each row.
-pub(super) fn column<T, V: Cell>(
+pub(super) fn column<T, V: CellValue>(
     name: &'static str,
     value: impl Fn(&T) -> V + 'static,
-) -> Column<T> {
-    Column {
+) -> TableColumn<T> {
+    TableColumn {
         name,
         number: V::NUMBER,
         components: V::COMPONENTS,
@@ -102,6 +102,6 @@ pub(super) fn column<T, V: Cell>(
 }
 
 /// Writes a row into the strips of its columns. Errors: the disk.
-pub(super) fn put_row<T>(row: &T, columns: &[Column<T>], strips: &mut [Strip]) -> Result<()> {
+pub(super) fn put_row<T>(row: &T, columns: &[TableColumn<T>], strips: &mut [Strip]) -> Result<()> {
     columns.iter().zip(strips).try_for_each(|(column, strip)| (column.put)(row, strip))
 }

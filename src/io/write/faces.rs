@@ -16,7 +16,7 @@ const INTERFACE: u64 = 1 << 63;
 
 sort_record! {
     /// A boundary face in the merged mesh.
-    pub(super) struct BoundaryFace {
+    pub(super) struct MergedFace {
         /// Number of the input triangle, or an interface face's cut and number in it.
         key: u64,
         /// True for the side that is left out when both sides are written.
@@ -35,7 +35,7 @@ sort_record! {
     }
 }
 
-impl BoundaryFace {
+impl MergedFace {
     /// Number of the triangle in the input; `None` for an interface face.
     pub fn triangle(&self) -> Option<u64> {
         (self.key < INTERFACE).then_some(self.key)
@@ -57,7 +57,7 @@ pub(super) struct FaceSource<'a> {
 
 /// Collects faces of one sub-domain after the other.
 pub(super) struct FaceSorter {
-    sorter: Sorter<BoundaryFace>,
+    sorter: Sorter<MergedFace>,
     path: PathBuf,
 }
 
@@ -82,7 +82,7 @@ impl FaceSorter {
         let Some((side, tet)) = sides.filter_map(|side| Some((side, tet_of(side)?))).next() else {
             return Ok(());
         };
-        let face = BoundaryFace {
+        let face = MergedFace {
             key: f.triangle,
             is_second: side != preferred,
             vertices: part.numbers.vertices(f.vertices)?,
@@ -105,7 +105,7 @@ impl FaceSorter {
         let Some(tet) = part.numbers.tet(f.tet) else {
             return Ok(());
         };
-        let face = BoundaryFace {
+        let face = MergedFace {
             key: INTERFACE | u64::from(f.cut) << 32 | u64::from(f.index),
             is_second: false,
             vertices: part.numbers.vertices(f.vertices)?,
@@ -119,7 +119,7 @@ impl FaceSorter {
     }
 
     /// Ends collecting. Errors: the disk.
-    pub fn finish(self) -> Result<BoundaryFaces> {
+    pub fn finish(self) -> Result<MergedFaces> {
         let mut file = FaceFile::create(self.path)?;
         let mut last = None;
         for face in self.sorter.finish()? {
@@ -132,9 +132,9 @@ impl FaceSorter {
     }
 }
 
-/// BoundaryFaces being written to their scratch file.
+/// MergedFaces being written to their scratch file.
 struct FaceFile {
-    faces: BoundaryFaces,
+    faces: MergedFaces,
     stream: Stream,
 }
 
@@ -142,33 +142,33 @@ impl FaceFile {
     fn create(path: PathBuf) -> Result<Self> {
         let stream = scratch(&path)?;
         let (n, labels) = (0, BTreeMap::new());
-        let faces = BoundaryFaces { n, labels, path };
+        let faces = MergedFaces { n, labels, path };
         Ok(Self { faces, stream })
     }
 
-    fn put(&mut self, face: &BoundaryFace) -> Result<()> {
+    fn put(&mut self, face: &MergedFace) -> Result<()> {
         self.faces.n += 1;
         *self.faces.labels.entry(face.label).or_default() += 1;
         self.stream.record(face)
     }
 
-    fn finish(self) -> Result<BoundaryFaces> {
+    fn finish(self) -> Result<MergedFaces> {
         self.stream.finish()?;
         Ok(self.faces)
     }
 }
 
 /// All boundary faces, in a scratch file.
-pub(super) struct BoundaryFaces {
+pub(super) struct MergedFaces {
     pub n: u64,
     /// Number of faces of each label.
     pub labels: BTreeMap<u32, u64>,
     path: PathBuf,
 }
 
-impl BoundaryFaces {
+impl MergedFaces {
     /// Every face, input triangles first. Errors: the disk, and those of `each`.
-    pub fn each(&self, each: impl FnMut(&BoundaryFace) -> Result<()>) -> Result<()> {
+    pub fn each(&self, each: impl FnMut(&MergedFace) -> Result<()>) -> Result<()> {
         RecordReader::open(&self.path, 0)?.each(each)
     }
 
@@ -176,7 +176,7 @@ impl BoundaryFaces {
     pub fn rewritten(
         &self,
         path: &Path,
-        mut each: impl FnMut(&BoundaryFace, &mut dyn FnMut(&BoundaryFace) -> Result<()>) -> Result<()>,
+        mut each: impl FnMut(&MergedFace, &mut dyn FnMut(&MergedFace) -> Result<()>) -> Result<()>,
     ) -> Result<Self> {
         let mut file = FaceFile::create(path.to_owned())?;
         self.each(|face| each(face, &mut |face| file.put(face)))?;

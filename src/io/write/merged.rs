@@ -10,18 +10,15 @@ use tetdb_schema::record::SealedVertex;
 
 use super::doubles::Doubles;
 use super::error::{Result, WriteError};
-use super::faces::{BoundaryFace, BoundaryFaces, FaceSorter, FaceSource};
-use super::numbering::{
-    Numbering, PartNumbers, Sharer, Source, Subset, shareable_vertices, sharers,
-};
+use super::faces::{FaceSorter, FaceSource, MergedFace, MergedFaces};
+use super::merged_parts::{collect_faces, misplaced, required_faces, sources};
+use super::numbering::{Numbering, PartNumbers, Sharer, Source, shareable_vertices, sharers};
 use super::scope::{FaceSet, Scope};
 use super::wires::{WrittenEmbedded, memory_left};
 use tetdb_base::shape::excess_near;
 use tetdb_base::storage::{Sorted, check_cancelled};
 use tetdb_schema::catalog::SubdomainRow;
-use tetdb_schema::record::NO_TET;
-use tetdb_store::sealed::SealedError;
-use tetdb_store::sealed::{FaceJoin, FaceJoinSorter, Shape, Subdomain};
+use tetdb_store::sealed::{SealedError, Shape, Subdomain};
 use tetdb_store::store::Catalog;
 
 /// Counts records and reports progress.
@@ -95,7 +92,7 @@ pub(super) struct Merged<'a> {
     parts: Vec<Source>,
     regions: BTreeSet<u32>,
     numbering: Numbering,
-    faces: BoundaryFaces,
+    faces: MergedFaces,
     doubles: Option<Doubles>,
     wires: WrittenEmbedded,
     support_first: u64,
@@ -188,7 +185,7 @@ impl<'a> Merged<'a> {
     /// Replaces each face by those that `each` puts for it. Errors: the disk, those of `each`.
     pub fn rewrite_faces(
         &mut self,
-        each: impl FnMut(&BoundaryFace, &mut dyn FnMut(&BoundaryFace) -> Result<()>) -> Result<()>,
+        each: impl FnMut(&MergedFace, &mut dyn FnMut(&MergedFace) -> Result<()>) -> Result<()>,
     ) -> Result<()> {
         self.faces = self.faces.rewritten(&self.dir.join("split-faces"), each)?;
         Ok(())
@@ -304,7 +301,7 @@ impl<'a> Merged<'a> {
         self.faces.n
     }
 
-    pub fn faces(&self) -> &BoundaryFaces {
+    pub fn faces(&self) -> &MergedFaces {
         &self.faces
     }
 
@@ -476,67 +473,4 @@ impl<'a> Merged<'a> {
         regions.retain(|&region| self.writes(region));
         Ok(regions)
     }
-}
-
-/// The sub-domains in `scope` and their written subsets; a sub-domain without written tetrahedra is left out.
-fn sources(store: &mut Catalog, scope: Scope, dir: &Path, memory: usize) -> Result<Vec<Source>> {
-    let mut sources = Vec::new();
-    for row in store.subdomains()? {
-        if !scope.holds(row.rank) {
-            continue;
-        }
-        let mut source = Source::from(row);
-        if !scope.regions.is_empty() {
-            let path = dir.join(format!("subset-{}", source.row.rank));
-            let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
-            [source.n_tets, source.n_vertices] = Subset::gather(&mut part, scope.regions, &path)?;
-            source.subset = Some(path);
-        }
-        if source.n_tets > 0 || scope.regions.is_empty() {
-            sources.push(source);
-        }
-    }
-    Ok(sources)
-}
-
-/// Gathers the faces of a sub-domain's tetrahedra that are required: input triangles, and support triangles of embedded edges. Errors: damage, the disk.
-fn required_faces(part: &mut Subdomain, dir: &Path, memory: u64) -> Result<FaceJoin> {
-    let mut sorter = FaceJoinSorter::new(dir, memory);
-    for facet in part.facets() {
-        check_cancelled();
-        let facet = facet?;
-        for tet in facet.tets.into_iter().filter(|&tet| tet != NO_TET) {
-            sorter.push(tet, facet.vertices, false, 0)?;
-        }
-    }
-    Ok(sorter.finish()?)
-}
-
-fn misplaced(part: &Subdomain, found: u32, expected: u32) -> SealedError {
-    part.damaged(format!("tetrahedron {found} stands where {expected} was expected"))
-}
-
-/// Adds the faces of a sub-domain that its scope lists to `sorter`. Interface faces are labelled by the sub-domain behind
-/// them, from `first_label` on. Facets from `support_first` on are no triangles of the input.
-fn collect_faces(
-    from: &mut Subdomain,
-    part: &FaceSource,
-    [first_label, support_first]: [u64; 2],
-    sorter: &mut FaceSorter,
-) -> Result<()> {
-    if part.scope.faces != FaceSet::Interfaces {
-        for facet in from.facets() {
-            let facet = facet?;
-            if facet.triangle < support_first {
-                sorter.push(&facet, part)?;
-            }
-        }
-    }
-    for face in from.interfaces() {
-        let face = face?;
-        if part.scope.lists(part.rank, face.other) {
-            sorter.push_interface(&face, first_label as u32 + face.other, part)?;
-        }
-    }
-    Ok(())
 }

@@ -23,6 +23,7 @@ mod gmsh22;
 mod hdf5;
 mod medit;
 mod merged;
+mod merged_parts;
 mod mfem;
 mod midpoints;
 mod names;

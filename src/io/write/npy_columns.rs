@@ -4,9 +4,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::columns::{Column, column, put_row};
+use super::columns::{TableColumn, column, put_row};
 use super::error::Result;
-use super::faces::BoundaryFace;
+use super::faces::MergedFace;
 use super::merged::{Measured, Merged, MergedTet};
 use super::npy::{HEAD_BYTES, head};
 use super::output_files::OutputFiles;
@@ -15,7 +15,7 @@ use tetdb_schema::record::SealedVertex;
 
 /// Arrays of equally many rows being written.
 struct Arrays<T> {
-    columns: Vec<Column<T>>,
+    columns: Vec<TableColumn<T>>,
     strips: Vec<Strip>,
 }
 
@@ -25,9 +25,9 @@ impl<T> Arrays<T> {
         outputs: &mut OutputFiles,
         out: &Path,
         rows: u64,
-        columns: Vec<Column<T>>,
+        columns: Vec<TableColumn<T>>,
     ) -> Result<Self> {
-        let strip = |column: &Column<T>| {
+        let strip = |column: &TableColumn<T>| {
             let length = rows * column.components * column.number.bytes();
             let file_bytes = HEAD_BYTES as u64 + length;
             let path = outputs.create(&array_path(out, column.name), file_bytes)?;
@@ -64,7 +64,7 @@ fn vertex_numbers<T, const N: usize>(
     name: &'static str,
     n_vertices: u64,
     numbers: fn(&T) -> [u64; N],
-) -> Column<T>
+) -> TableColumn<T>
 where
     T: 'static,
 {
@@ -97,9 +97,9 @@ pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) ->
     arrays.finish()?;
 
     let columns = vec![
-        vertex_numbers("triangles", n_vertices, |face: &BoundaryFace| face.vertices),
-        column("label", |face: &BoundaryFace| face.label),
-        column("input_id", |face: &BoundaryFace| face.triangle().map_or(-1, |t| t as i64)),
+        vertex_numbers("triangles", n_vertices, |face: &MergedFace| face.vertices),
+        column("label", |face: &MergedFace| face.label),
+        column("input_id", |face: &MergedFace| face.triangle().map_or(-1, |t| t as i64)),
     ];
     let mut arrays = Arrays::create(outputs, out, mesh.n_faces(), columns)?;
     mesh.faces().each(|face| arrays.row(face))?;

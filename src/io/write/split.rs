@@ -8,7 +8,7 @@ use std::path::Path;
 
 use super::doubles::{Change, Double, Doubles};
 use super::error::Result;
-use super::faces::BoundaryFace;
+use super::faces::MergedFace;
 use super::merged::Merged;
 use super::output_files::OutputFiles;
 use super::stream::{RecordReader, Stream, save, scratch};
@@ -144,7 +144,7 @@ fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<TetCorner>, Sorted<FaceCorner>
     Ok((corners.finish()?, face_corners.finish()?))
 }
 
-fn is_sheet(face: &BoundaryFace) -> bool {
+fn is_sheet(face: &MergedFace) -> bool {
     face.regions[0] != 0 && face.regions[0] == face.regions[1]
 }
 

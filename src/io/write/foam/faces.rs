@@ -35,7 +35,7 @@ sort_record! {
 
 sort_record! {
     /// An interface face seen from one side.
-    struct InterfaceSide {
+    struct InterfaceCell {
         cut: u32,
         index: u32,
         rank: u32,
@@ -72,7 +72,7 @@ sort_record! {
 
 sort_record! {
     /// A face on the boundary.
-    pub(super) struct OuterFace {
+    pub(super) struct PatchFace {
         /// Label of the face; numbers behind all labels stand for sub-domains that are not written.
         pub patch: u32,
         pub owner: u32,
@@ -140,7 +140,7 @@ impl Census {
 /// The faces of one sub-domain, each list sorted.
 pub(super) struct PartFaces {
     pub inner: Sorted<InnerFace>,
-    pub outer: Sorted<OuterFace>,
+    pub outer: Sorted<PatchFace>,
     pub between: Sorted<SharedFace>,
     pub uppers: Sorted<UpperFace>,
 }
@@ -148,7 +148,7 @@ pub(super) struct PartFaces {
 /// The lists of one sub-domain being gathered.
 struct FaceLists {
     inner: Sorter<InnerFace>,
-    outer: Sorter<OuterFace>,
+    outer: Sorter<PatchFace>,
     between: Sorter<SharedFace>,
     uppers: Sorter<UpperFace>,
 }
@@ -175,7 +175,7 @@ impl FaceWalk {
     }
 
     /// Counts the faces of patches and zones; returns the interface faces.
-    fn count_patches(&mut self, mesh: &mut Merged) -> Result<Sorted<InterfaceSide>> {
+    fn count_patches(&mut self, mesh: &mut Merged) -> Result<Sorted<InterfaceCell>> {
         let parts = mesh.parts();
         let mut sides = Sorter::new(mesh.dir(), mesh.sorter_bytes());
         for (p, row) in parts.iter().enumerate() {
@@ -202,7 +202,7 @@ impl FaceWalk {
                 if !is_written && !mesh.is_of_regions() {
                     *patches.entry(self.first_interface + face.other).or_default() += 1;
                 }
-                sides.push(InterfaceSide {
+                sides.push(InterfaceCell {
                     cut: face.cut,
                     index: face.index,
                     rank: row.rank,
@@ -217,7 +217,7 @@ impl FaceWalk {
     }
 
     /// Finds the cell behind each interface face; counts the faces between sub-domains that are written.
-    fn pair(&mut self, mesh: &Merged, sides: Sorted<InterfaceSide>) -> Result<Sorted<CellBehind>> {
+    fn pair(&mut self, mesh: &Merged, sides: Sorted<InterfaceCell>) -> Result<Sorted<CellBehind>> {
         let parts = mesh.parts();
         let mut between = vec![BTreeMap::new(); parts.len()];
         let mut behind = Sorter::new(mesh.dir(), mesh.sorter_bytes());
@@ -228,7 +228,7 @@ impl FaceWalk {
                 continue;
             }
             for (side, back) in both.iter().zip([both.get(1), both.first()]) {
-                let &InterfaceSide { cut, index, rank, other, vertices, .. } = side;
+                let &InterfaceCell { cut, index, rank, other, vertices, .. } = side;
                 let back = back.filter(|_| both.len() == 2);
                 let cell = back.map_or(NO_TET, |back| back.cell);
                 behind.push(CellBehind { rank, vertices, other, cut, index, cell })?;
@@ -315,7 +315,7 @@ impl FaceWalk {
                 return Err(broken(part, owner, what));
             }
         };
-        Ok(lists.outer.push(OuterFace { patch, owner, vertices })?)
+        Ok(lists.outer.push(PatchFace { patch, owner, vertices })?)
     }
 }
 

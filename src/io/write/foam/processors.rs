@@ -15,7 +15,7 @@ use super::polymesh::{
     FaceFiles, FoamPatch, Names, Size, Zones, mesh_dir, write_boundary, write_labels,
 };
 use super::serial::{WithTwoCells, in_order};
-use tetdb_base::storage::{Sorter, sort_record};
+use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_store::sealed::MergeReader;
 
 sort_record! {
@@ -54,9 +54,8 @@ pub(super) fn write(
     let parts = mesh.parts();
     let mut counts = FileCounts::default();
     let n_between: u64 = (walk.census.between.iter().flat_map(|b| b.values())).sum();
-    let inner =
-        |(p, part): (usize, &super::super::merged::Part)| walk.census.n_inner(p, part.n_tets);
-    let n_inner = parts.iter().enumerate().map(inner).sum::<u64>() + n_between / 2;
+    let inner = parts.iter().enumerate().map(|(p, part)| walk.census.n_inner(p, part.n_tets));
+    let n_inner = inner.sum::<u64>() + n_between / 2;
     let mut start = n_inner;
     let mut job = ProcessorFiles { case, names, ascii, n_inner, patch_starts: BTreeMap::new() };
     for &label in names.patches.keys() {
@@ -78,8 +77,20 @@ pub(super) fn write(
         }
     }
     mesh.expect_count("inner faces", job.n_inner, next)?;
-    let mut addresses = MergeReader::new(addresses.finish()?);
-    for (p, part) in parts.iter().enumerate() {
+    write_face_addresses(mesh, outputs, (walk, &job), selection, addresses.finish()?)?;
+    Ok(counts)
+}
+
+/// Writes the number in the whole of each face of the selected processors, from 1 and negative where the whole has the opposite direction.
+fn write_face_addresses(
+    mesh: &Merged,
+    outputs: &mut OutputFiles,
+    (walk, job): (&FaceWalk, &ProcessorFiles),
+    selection: &ExportSelection,
+    addresses: Sorted<FaceAddress>,
+) -> Result<()> {
+    let (ascii, mut addresses) = (job.ascii, MergeReader::new(addresses));
+    for (p, part) in mesh.parts().iter().enumerate() {
         let is_written = selection.writes_piece(part.rank);
         let of_part = std::iter::from_fn(|| addresses.next_if(|a| a.rank == part.rank).transpose());
         if !is_written {
@@ -98,7 +109,7 @@ pub(super) fn write(
             })
         })?;
     }
-    Ok(counts)
+    Ok(())
 }
 
 fn scratch_path(dir: &Path, rank: u32) -> std::path::PathBuf {
@@ -186,15 +197,11 @@ impl ProcessorFiles<'_> {
             if let Some((zone, is_flipped)) = zone_of(face.zone) {
                 zones.push(zone, files.written() as u32, is_flipped)?;
             }
-            // Both sides begin with the vertex that has the least number in the whole; its neighbor then goes round the other way.
-            let [a, b, c] = face.vertices;
-            let [i, j, k] = numbers.vertices(face.vertices)?;
-            let turned = match i.min(j).min(k) {
-                least if least == i => [a, b, c],
-                least if least == j => [b, c, a],
-                _ => [c, a, b],
-            };
-            files.outer(face.owner, turned)?;
+            // Both sides begin with the vertex that has the least number in the whole, and go round in opposite directions.
+            let in_whole = numbers.vertices(face.vertices)?;
+            let mut vertices = face.vertices;
+            vertices.rotate_left((0..3).min_by_key(|&i| in_whole[i]).unwrap_or(0));
+            files.outer(face.owner, vertices)?;
         }
         mesh.expect_count("faces", size.faces, files.written())?;
         files.finish()?;

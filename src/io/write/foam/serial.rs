@@ -14,7 +14,7 @@ use tetdb_store::sealed::MergeReader;
 
 sort_record! {
     /// A face on the boundary of the whole.
-    struct OuterFaceInOrder {
+    struct OrderedPatchFace {
         patch: u32,
         /// Number of outer faces before it, over all sub-domains: the faces of a cell keep their order.
         place: u32,
@@ -127,7 +127,7 @@ fn write_faces(
         })?;
         for face in faces.outer {
             let face = face?;
-            outer.push(OuterFaceInOrder {
+            outer.push(OrderedPatchFace {
                 patch: face.patch,
                 place: n_outer,
                 owner: first + face.owner,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::error::Result;
-use super::super::faces::BoundaryFace;
+use super::super::faces::MergedFace;
 use super::super::merged::Merged;
 use super::super::names::quotable;
 use super::super::wires::WrittenEmbedded;
@@ -106,7 +106,7 @@ impl Entities {
     }
 
     /// The place of a face's surface, if it is written.
-    pub fn surface(&self, face: &BoundaryFace) -> Option<u32> {
+    pub fn surface(&self, face: &MergedFace) -> Option<u32> {
         let key = (face.label, face.subdomain);
         let found = self.surfaces.binary_search_by_key(&key, |s| s.0);
         found.ok().map(|place| place as u32)

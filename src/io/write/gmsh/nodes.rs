@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::error::Result;
 use super::super::merged::{Merged, OpenedPart};
-use super::super::midpoints::{MidpointReader, Midpoints};
+use super::super::midpoints::{ElementEdges, MidpointReader, Midpoints};
 use super::super::stream::{RecordReader, save};
 use super::entities::Entities;
 use super::out::Out;
@@ -68,122 +68,144 @@ pub(super) fn gather(
     name: &Path,
 ) -> Result<Nodes> {
     let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
-    let claims = claims(mesh, piece, entities)?;
-    let mut points = piece.midpoints.map(Midpoints::points).transpose()?;
-    let nodes = granted(claims, mesh.n_vertices(), &mut points, Sorter::new(&dir, bytes))?;
-    let file = name.file_name().unwrap_or_default().to_string_lossy();
-    stored(nodes, entities, dir.join(format!("nodes-{file}")))
-}
-
-/// The entities of vertices and midpoints by faces, tetrahedra and ghosts of the piece, sorted by vertex.
-fn claims(
-    mesh: &mut Merged,
-    piece: &GmshPiece,
-    entities: &Entities,
-) -> Result<Sorted<VertexEntity>> {
-    let parts = mesh.parts();
-    let n_vertices = mesh.n_vertices();
-    let mut claims = Sorter::new(mesh.dir(), mesh.sorter_bytes());
-    let mut claim =
-        |vertex, entity, point| claims.push(VertexEntity { vertex, entity, point: Payload(point) });
-    let mut edges = piece.midpoints.map(Midpoints::faces).transpose()?;
-    let mut number = 0;
-    mesh.faces().each(|face| {
-        if let Some(entity) = entities.surface(face) {
-            for vertex in face.vertices {
-                claim(vertex, entity, [0.0; 3])?;
-            }
-            if let Some(edges) = &mut edges {
-                for edge in edges.element(number)? {
-                    claim(n_vertices + edge, entity, [0.0; 3])?;
-                }
-            }
-        }
-        number += 1;
-        Ok(())
-    })?;
+    let (n_vertices, records) = (mesh.n_vertices(), Sorter::new(&dir, bytes));
+    let mut sorter = EntitySorter { piece, entities, n_vertices, records };
+    sorter.add_faces(mesh)?;
     let mut edges = piece.midpoints.map(Midpoints::tets).transpose()?;
     for &p in piece.which {
+        sorter.add_part(mesh, p, &mut edges)?;
+    }
+    sorter.add_ghosts(&mut edges)?;
+    let mut points = piece.midpoints.map(Midpoints::points).transpose()?;
+    let sorted = sorter.records.finish()?;
+    let nodes = first_entities(sorted, n_vertices, &mut points, Sorter::new(&dir, bytes))?;
+    let file = name.file_name().unwrap_or_default().to_string_lossy();
+    save_nodes(nodes, entities, dir.join(format!("nodes-{file}")))
+}
+
+/// Entities of vertices and midpoints being gathered.
+struct EntitySorter<'a> {
+    piece: &'a GmshPiece<'a>,
+    entities: &'a Entities,
+    n_vertices: u64,
+    records: Sorter<VertexEntity>,
+}
+
+impl EntitySorter<'_> {
+    fn push(&mut self, vertex: u64, entity: u32) -> Result<()> {
+        Ok(self.records.push(VertexEntity { vertex, entity, point: Payload([0.0; 3]) })?)
+    }
+
+    fn push_all(&mut self, vertices: impl IntoIterator<Item = u64>, entity: u32) -> Result<()> {
+        vertices.into_iter().try_for_each(|vertex| self.push(vertex, entity))
+    }
+
+    fn push_position(&mut self, vertex: u64, point: [f64; 3]) -> Result<()> {
+        let record = VertexEntity { vertex, entity: POSITION, point: Payload(point) };
+        Ok(self.records.push(record)?)
+    }
+
+    /// Adds the vertices and midpoints of the boundary faces.
+    fn add_faces(&mut self, mesh: &Merged) -> Result<()> {
+        let mut edges = self.piece.midpoints.map(Midpoints::faces).transpose()?;
+        let mut number = 0;
+        mesh.faces().each(|face| {
+            if let Some(entity) = self.entities.surface(face) {
+                self.push_all(face.vertices, entity)?;
+                if let Some(edges) = &mut edges {
+                    let edges = edges.element(number)?;
+                    self.push_all(edges.map(|edge| self.n_vertices + edge), entity)?;
+                }
+            }
+            number += 1;
+            Ok(())
+        })
+    }
+
+    /// Adds the vertices of the partition at place `p`, and the midpoints of its tetrahedra.
+    fn add_part(
+        &mut self,
+        mesh: &mut Merged,
+        p: usize,
+        edges: &mut Option<ElementEdges<6>>,
+    ) -> Result<()> {
+        let parts = mesh.parts();
         let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
-        let rank = parts[p].rank;
-        let only = entities.only_volume(rank);
+        let only = self.entities.only_volume(parts[p].rank);
         // All tetrahedra around an inner vertex are of one region, so the first one decides.
         let mut vertices = MetNumbers::new(parts[p].first_vertex, parts[p].n_vertices);
-        let of_edges = piece.midpoints.map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
-        let mut midpoints = MetNumbers::new(n_vertices + of_edges.0, of_edges.1);
+        let (first, n) = self.piece.midpoints.map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
+        let mut midpoints = MetNumbers::new(self.n_vertices + first, n);
         let needs_tets = only.is_none() || edges.is_some();
         for tet in part.tets().take_while(|_| needs_tets) {
             let (id, tet) = tet?;
             let Some(number) = numbers.tet(id.local()) else {
                 continue;
             };
-            let entity = entities.volume(tet.region, rank);
-            for v in numbers.vertices(tet.nodes)? {
-                if vertices.is_new(v) {
-                    claim(v, entity, [0.0; 3])?;
-                }
-            }
-            if let Some(edges) = &mut edges {
-                for v in edges.element(number)?.map(|edge| n_vertices + edge) {
-                    if midpoints.is_new(v) {
-                        claim(v, entity, [0.0; 3])?;
-                    }
-                }
+            let entity = self.entities.volume(tet.region, parts[p].rank);
+            let corners = numbers.vertices(tet.nodes)?;
+            self.push_all(corners.into_iter().filter(|&v| vertices.is_new(v)), entity)?;
+            if let Some(edges) = edges {
+                let middles = edges.element(number)?.map(|edge| self.n_vertices + edge);
+                self.push_all(middles.into_iter().filter(|&v| midpoints.is_new(v)), entity)?;
             }
         }
         for (v, vertex) in (0u32..).zip(part.vertices()) {
             let vertex = vertex?;
-            let Some(number) = numbers.vertex(v) else {
-                continue;
-            };
-            claim(number, POSITION, vertex.point)?;
-            if let Some(entity) = only {
-                claim(number, entity, [0.0; 3])?;
+            if let Some(number) = numbers.vertex(v) {
+                self.push_position(number, vertex.point)?;
+                if let Some(entity) = only {
+                    self.push(number, entity)?;
+                }
             }
         }
         mesh.advance(parts[p].n_vertices as usize);
-    }
-    piece.each_ghost(|ghost| {
-        let entity = entities.volume(ghost.region, ghost.from);
-        for (v, point) in ghost.nodes.0.into_iter().zip(ghost.points.0.as_chunks::<3>().0) {
-            claim(v, entity, [0.0; 3])?;
-            claim(v, POSITION, *point)?;
-        }
-        if let Some(edges) = &mut edges {
-            for edge in edges.element(ghost.number)? {
-                claim(n_vertices + edge, entity, [0.0; 3])?;
-            }
-        }
         Ok(())
-    })?;
-    Ok(claims.finish()?)
+    }
+
+    /// Adds the vertices and midpoints of the ghosts.
+    fn add_ghosts(&mut self, edges: &mut Option<ElementEdges<6>>) -> Result<()> {
+        let piece = self.piece;
+        piece.each_ghost(|ghost| {
+            let entity = self.entities.volume(ghost.region, ghost.from);
+            self.push_all(ghost.nodes.0, entity)?;
+            for (v, point) in ghost.nodes.0.into_iter().zip(ghost.points.0.as_chunks::<3>().0) {
+                self.push_position(v, *point)?;
+            }
+            if let Some(edges) = edges {
+                let edges = edges.element(ghost.number)?;
+                self.push_all(edges.map(|edge| self.n_vertices + edge), entity)?;
+            }
+            Ok(())
+        })
+    }
 }
 
 /// The first entity of each vertex, with its position, sorted by entity.
-fn granted(
-    claims: Sorted<VertexEntity>,
+fn first_entities(
+    records: Sorted<VertexEntity>,
     n_vertices: u64,
     points: &mut Option<MidpointReader>,
     mut sorter: Sorter<EntityNode>,
 ) -> Result<Sorted<EntityNode>> {
     let mut last = None;
-    for claim in claims {
-        let claim = claim?;
+    for record in records {
+        let record = record?;
         match last {
-            Some((vertex, entity)) if vertex == claim.vertex => {
-                if claim.entity == POSITION && entity != POSITION {
-                    sorter.push(EntityNode { entity, vertex, point: claim.point })?;
+            Some((vertex, entity)) if vertex == record.vertex => {
+                if record.entity == POSITION && entity != POSITION {
+                    sorter.push(EntityNode { entity, vertex, point: record.point })?;
                     last = Some((vertex, POSITION));
                 }
             }
             _ => {
-                last = Some((claim.vertex, claim.entity));
+                last = Some((record.vertex, record.entity));
                 // Midpoints have no record of their position: the positions are in the order of their numbers.
-                let edge = claim.vertex.checked_sub(n_vertices);
+                let edge = record.vertex.checked_sub(n_vertices);
                 if let (Some(points), Some(edge)) = (&mut *points, edge) {
                     sorter.push(EntityNode {
-                        entity: claim.entity,
-                        vertex: claim.vertex,
+                        entity: record.entity,
+                        vertex: record.vertex,
                         point: Payload(points.at(edge)?),
                     })?;
                 }
@@ -194,7 +216,7 @@ fn granted(
 }
 
 /// Counts the vertices and saves them at `path`.
-fn stored(sorted: Sorted<EntityNode>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
+fn save_nodes(sorted: Sorted<EntityNode>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
     let mut nodes =
         Nodes { n: 0, counts: vec![0; entities.tags().len()], span: [u64::MAX, 0], path };
     let Nodes { n, counts, span: [least, greatest], path } = &mut nodes;

@@ -6,10 +6,10 @@
 
 use std::path::Path;
 
-use super::grid::{Container, Grid, GridWriter};
+use super::grid::{Container, GridWriter, VtkGrid};
 use crate::write::columns::column;
 use crate::write::error::Result;
-use crate::write::faces::BoundaryFace;
+use crate::write::faces::MergedFace;
 use crate::write::merged::Merged;
 use crate::write::midpoints::Midpoints;
 use crate::write::numbering::{CornerSorter, DenseCorners};
@@ -65,6 +65,9 @@ pub(super) fn partitions(
     mesh.parts().into_iter().enumerate().map(partition).collect()
 }
 
+/// The lasting id of a point that has none: the midpoint of an edge.
+pub(super) const NO_ID: i64 = -1;
+
 /// A point of the file: its place in the file of the tetrahedra, and its lasting id or -1.
 type PointRow = (u64, i64);
 
@@ -88,22 +91,20 @@ pub(in crate::write) fn write(
         column("mesh_vertex", |point: &PointRow| point.0 as i64),
         column("global_id", |point: &PointRow| point.1),
     ];
-    let cut_of = |face: &BoundaryFace| face.cut().map(|(cut, _)| cut);
+    let cut_of = |face: &MergedFace| face.cut().map(|(cut, _)| cut);
     let faces = vec![
-        column("label", |face: &BoundaryFace| face.label),
-        column("input_id", |face: &BoundaryFace| or_none(face.triangle())),
-        column("region_front", |face: &BoundaryFace| face.regions[0]),
-        column("region_back", |face: &BoundaryFace| face.regions[1]),
-        column("subdomain", |face: &BoundaryFace| face.subdomain),
-        column("neighbor", move |face: &BoundaryFace| {
-            or_none(cut_of(face).and(Some(face.neighbor)))
-        }),
-        column("cut", move |face: &BoundaryFace| or_none(cut_of(face))),
-        column("cut_face", |face: &BoundaryFace| or_none(face.cut().map(|(_, index)| index))),
+        column("label", |face: &MergedFace| face.label),
+        column("input_id", |face: &MergedFace| or_none(face.triangle())),
+        column("region_front", |face: &MergedFace| face.regions[0]),
+        column("region_back", |face: &MergedFace| face.regions[1]),
+        column("subdomain", |face: &MergedFace| face.subdomain),
+        column("neighbor", move |face: &MergedFace| or_none(cut_of(face).and(Some(face.neighbor)))),
+        column("cut", move |face: &MergedFace| or_none(cut_of(face))),
+        column("cut_face", |face: &MergedFace| or_none(face.cut().map(|(_, index)| index))),
     ];
     let counts = [n_vertices, n_faces, n_corners];
     let texts = ("label_names", &*label_names(mesh));
-    let grid = Grid::new(&container, counts, texts, points, faces);
+    let grid = VtkGrid::new(&container, counts, texts, points, faces);
     let path = outputs.create(out, grid.file_bytes())?;
     let mut file = grid.open(&path)?;
     write_points(mesh, &mut file, &used, &partitions(mesh, is_hdf, midpoints), midpoints)?;
@@ -116,7 +117,7 @@ pub(in crate::write) fn write(
 /// Writes the vertices and midpoints whose numbers are in the file `used`.
 fn write_points(
     mesh: &mut Merged,
-    file: &mut GridWriter<PointRow, BoundaryFace>,
+    file: &mut GridWriter<PointRow, MergedFace>,
     used: &Path,
     partitions: &[Partition],
     midpoints: Option<&Midpoints>,
@@ -142,7 +143,7 @@ fn write_points(
             next = used.next()?;
             let p = partitions.partition_point(|p| p.first_midpoint <= edge) - 1;
             let vertices = partitions[p].first_vertex + partitions[p].n_vertices;
-            file.point(&(vertices + edge, super::NO_ID), position?)?;
+            file.point(&(vertices + edge, NO_ID), position?)?;
         }
     }
     Ok(())

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::grid::{Container, Grid};
+use super::grid::{Container, VtkGrid};
 use crate::write::columns::column;
 use crate::write::error::{Result, WriteError};
 use crate::write::output_files::OutputFiles;
@@ -38,7 +38,7 @@ pub fn defects(surface: &Surface, defects: &[Defect], out: &Path) -> Result<u64>
     ];
     let texts: Vec<u8> = KINDS.iter().flat_map(|word| word.bytes().chain([0])).collect();
     let texts = ("defect_names", texts.as_slice());
-    let grid = Grid::new(&Container::Xml, [3 * n, n, 3], texts, vec![], columns);
+    let grid = VtkGrid::new(&Container::Xml, [3 * n, n, 3], texts, vec![], columns);
     let mut outputs = OutputFiles::new(out)?;
     let path = outputs.create(out, grid.file_bytes())?;
     let mut file = grid.open(&path)?;

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use crate::write::columns::{Column, Number, put_row};
+use crate::write::columns::{Number, TableColumn, put_row};
 use crate::write::error::Result;
 use crate::write::hdf5::{self, Hdf5Object};
 use crate::write::stream::Strip;
@@ -28,8 +28,8 @@ struct Array {
 }
 
 impl Array {
-    fn of_columns<T>(group: Group, columns: &[Column<T>]) -> impl Iterator<Item = Self> {
-        columns.iter().map(move |&Column { name, number, components, .. }| Self {
+    fn of_columns<T>(group: Group, columns: &[TableColumn<T>]) -> impl Iterator<Item = Self> {
+        columns.iter().map(move |&TableColumn { name, number, components, .. }| Self {
             group,
             name,
             number,
@@ -68,9 +68,9 @@ pub(super) type Counts = [u64; 3];
 /// A VTK file: its columns and the place of each array.
 ///
 /// `P` and `C` are the rows of points and cells; all cells have equally many corners.
-pub(super) struct Grid<P, C> {
-    points: Vec<Column<P>>,
-    cells: Vec<Column<C>>,
+pub(super) struct VtkGrid<P, C> {
+    points: Vec<TableColumn<P>>,
+    cells: Vec<TableColumn<C>>,
     /// Connectivity and offsets have 32 bits.
     is_narrow: bool,
     is_hdf: bool,
@@ -93,14 +93,14 @@ struct Layout {
 
 const TAIL: &str = "\n  </AppendedData>\n</VTKFile>\n";
 
-impl<P, C> Grid<P, C> {
+impl<P, C> VtkGrid<P, C> {
     /// Lays out a file. `texts` go into the field data, unless they are empty.
     pub fn new(
         container: &Container,
         counts: Counts,
         texts: Texts,
-        points: Vec<Column<P>>,
-        cells: Vec<Column<C>>,
+        points: Vec<TableColumn<P>>,
+        cells: Vec<TableColumn<C>>,
     ) -> Self {
         let [n_points, n_cells, corners] = counts;
         let is_hdf = *container != Container::Xml;
@@ -173,7 +173,7 @@ impl<P, C> Grid<P, C> {
 
 /// The arrays of some or all partitions being written.
 pub(super) struct GridWriter<'g, P, C> {
-    grid: &'g Grid<P, C>,
+    grid: &'g VtkGrid<P, C>,
     point_data: Vec<Strip>,
     cell_data: Vec<Strip>,
     positions: Strip,

@@ -11,7 +11,7 @@ mod selected;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::columns::{Column, column};
+use super::columns::{TableColumn, column};
 use super::error::{Result, WriteError};
 use super::merged::{Measured, Merged, MergedTet};
 use super::midpoints::Midpoints;
@@ -19,22 +19,19 @@ use super::output_files::OutputFiles;
 use super::selection::Share;
 use super::writers::Writers;
 pub(super) use boundary::write as write_boundary;
-use boundary::{Partition, partitions};
+use boundary::{NO_ID, Partition, partitions};
 pub use defects::defects;
-use grid::{Container, Grid};
+use grid::{Container, VtkGrid};
 pub use selected::{SelectedTet, SelectedVtu};
 use tetdb_base::storage::RemoteFailure;
 
-/// The lasting id of a point that has none: the midpoint of an edge.
-const NO_ID: i64 = -1;
-
 /// Columns of the vertices, whose rows are lasting ids.
-pub(super) fn vertex_columns() -> Vec<Column<i64>> {
+pub(super) fn vertex_columns() -> Vec<TableColumn<i64>> {
     vec![column("global_id", |id: &i64| *id)]
 }
 
 /// Columns of the tetrahedra.
-pub(super) fn tet_columns() -> Vec<Column<MergedTet>> {
+pub(super) fn tet_columns() -> Vec<TableColumn<MergedTet>> {
     vec![
         column("subdomain", |tet: &MergedTet| tet.subdomain),
         column("region", |tet: &MergedTet| tet.region),
@@ -44,7 +41,7 @@ pub(super) fn tet_columns() -> Vec<Column<MergedTet>> {
     ]
 }
 
-type TetGrid = Grid<i64, MergedTet>;
+type TetGrid = VtkGrid<i64, MergedTet>;
 
 /// Writes both files. Several processes may write partitions of a `.vtkhdf`, whose mesh numbers the vertices of each sub-domain apart.
 pub(super) fn write(
@@ -64,7 +61,7 @@ pub(super) fn write(
     let [n_points, n_tets, _] = rows(&partitions);
     let counts = [n_points, n_tets, if midpoints.is_some() { 10 } else { 4 }];
     let texts = ("region_names", &*mesh.region_names());
-    let grid = Grid::new(&container, counts, texts, vertex_columns(), tet_columns());
+    let grid = VtkGrid::new(&container, counts, texts, vertex_columns(), tet_columns());
     let mut begin = || {
         let path = outputs.create(out, grid.file_bytes())?;
         grid.begin(&path).map(|()| path)

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::grid::{Container, Grid};
+use super::grid::{Container, VtkGrid};
 use crate::write::columns::column;
 use crate::write::error::Result;
 use crate::write::numbering::CornerSorter;
@@ -100,7 +100,7 @@ impl SelectedVtu {
             column("global_id", |tet: &TetRow| tet.id as i64),
         ];
         let counts = [n_vertices, self.n, 4];
-        let grid = Grid::new(&Container::Xml, counts, ("", &[]), vertex_columns, tet_columns);
+        let grid = VtkGrid::new(&Container::Xml, counts, ("", &[]), vertex_columns, tet_columns);
         let path = self.outputs.create(&self.out, grid.file_bytes())?;
         let mut file = grid.open(&path)?;
         RecordReader::open(&vertices_path, 0)?
