@@ -4,6 +4,8 @@
 //! has its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
 //! become doubles exactly. Polygons are fanned, vertices with identical bits are one.
 
+mod embedded;
+mod embedded_sink;
 mod error;
 mod feed;
 mod gmsh;
@@ -20,8 +22,6 @@ mod sizes;
 mod stl;
 mod tetgen;
 mod vtk;
-mod wire_sink;
-mod wires;
 
 #[cfg(test)]
 mod collection;
@@ -31,6 +31,8 @@ mod tests;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
+pub use embedded::read_wires;
+pub use embedded_sink::WireKind;
 pub use error::{FilePlace, ReadError, ReadFault, Spot};
 use feed::{Feed, Result};
 pub use lengths::read_lengths;
@@ -38,8 +40,6 @@ pub use open::is_stream;
 use open::{open, stem, unpacked_name};
 use sink::SurfaceSink;
 pub use sizes::{FileSizes, read_sizes, size_files};
-pub use wire_sink::WireKind;
-pub use wires::read_wires;
 
 use tetdb_base::surface::{Surface, SurfaceBuilder, SurfaceError};
 

@@ -5,8 +5,8 @@
 
 use std::io::BufRead;
 
+use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::feed::{Feed, not_a_number, parse, quote};
-use super::wire_sink::{WireKind, WireSink};
 use super::{FilePlace, ReadError, ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
@@ -118,10 +118,10 @@ fn vertex<'a, R: BufRead>(
 }
 
 /// Reads `l` lines as edges, or `p` lines as points; a line of them may name vertices that come later.
-pub(super) fn read_wires<R: BufRead>(
+pub(super) fn read_embedded<R: BufRead>(
     mut feed: Feed<R>,
     kind: WireKind,
-    sink: &mut WireSink,
+    sink: &mut EmbeddedSink,
 ) -> Result<()> {
     let mut names = Names::default();
     let mut line = Vec::new();

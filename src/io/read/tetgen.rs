@@ -6,8 +6,8 @@
 use std::io::BufRead;
 use std::path::Path;
 
+use super::embedded_sink::EmbeddedSink;
 use super::feed::{Feed, name, parse};
-use super::wire_sink::WireSink;
 use super::{ReadFault, Result, SurfaceSink, open};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceError, VolumePoints};
@@ -120,7 +120,7 @@ fn surface_points<R: BufRead>(
 }
 
 /// The points of a `.node` file, called by their markers.
-pub(super) fn read_nodes<R: BufRead>(feed: &mut Feed<R>, sink: &mut WireSink) -> Result<()> {
+pub(super) fn read_nodes<R: BufRead>(feed: &mut Feed<R>, sink: &mut EmbeddedSink) -> Result<()> {
     feed.comment = Some(b'#');
     let numbering = read_points(feed, |p, marker| {
         let label = sink.label(&marker_name(marker));
@@ -138,7 +138,7 @@ pub(super) fn read_segments<R: BufRead>(
     mut feed: Feed<R>,
     nodes: &Path,
     limit: u64,
-    sink: &mut WireSink,
+    sink: &mut EmbeddedSink,
 ) -> Result<()> {
     feed.comment = Some(b'#');
     let mut add = |p, _| sink.point(p);

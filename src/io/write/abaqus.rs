@@ -71,7 +71,7 @@ pub(super) fn write(
     let names = set_names(&mesh.labels());
     surfaces(sides, &names, &mut stream)?;
     node_sets(mesh, &dir, &names, &mut stream, midpoints)?;
-    wires(mesh, &mut stream);
+    embedded(mesh, &mut stream);
     stream.finish()
 }
 
@@ -125,20 +125,20 @@ fn elements(
 }
 
 /// Embedded edges as sets of T3D2 elements, points as sets of nodes.
-fn wires(mesh: &Merged, stream: &mut Stream) {
-    let wires = mesh.wires();
-    let labels = wires.edge_labels().into_iter().chain(wires.point_labels());
+fn embedded(mesh: &Merged, stream: &mut Stream) {
+    let embedded = mesh.embedded();
+    let labels = embedded.edge_labels().into_iter().chain(embedded.point_labels());
     let names = labels.map(|(label, _)| (label, mesh.label_name(label)));
     let names = set_names(&names.collect());
     let mut last = None;
-    for (number, ([a, b], label)) in (mesh.n_tets() + 1..).zip(&wires.edges) {
+    for (number, ([a, b], label)) in (mesh.n_tets() + 1..).zip(&embedded.edges) {
         if last.replace(label) != Some(label) {
             stream.text(&format!("*ELEMENT, TYPE=T3D2, ELSET=edges_{}\n", names[label]));
         }
         stream.text(&format!("{number},{},{}\n", a + 1, b + 1));
     }
     let mut last = None;
-    for point in &wires.points {
+    for point in &embedded.points {
         if last.replace(point.label) != Some(point.label) {
             stream.text(&format!("*NSET, NSET=points_{}\n", names[&point.label]));
         }

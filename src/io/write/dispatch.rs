@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::embedded_list::write_list;
 use super::error::Result;
 use super::format::MeshFormat;
 use super::merged::Merged;
@@ -9,7 +10,6 @@ use super::midpoints::Midpoints;
 use super::output_files::OutputFiles;
 use super::report::FileCounts;
 use super::selection::{Content, ElementOrder, ExportSelection};
-use super::wires_list::write_list;
 use super::writers::{Writers, is_first};
 use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtk};
 

@@ -7,8 +7,8 @@
 use std::path::Path;
 
 use super::error::Result;
+use super::gmsh;
 use super::merged::Merged;
-use super::names::quotable;
 use super::output_files::OutputFiles;
 use super::stream::Stream;
 
@@ -44,9 +44,9 @@ pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) ->
         stream.end()
     })?;
     let (n_faces, n_tets) = (mesh.n_faces(), mesh.n_tets());
-    let wires = mesh.wires();
-    let n_wires = (wires.edges.len() + wires.points.len()) as u64;
-    let n = n_faces + n_tets + n_wires;
+    let embedded = mesh.embedded();
+    let n_embedded = (embedded.edges.len() + embedded.points.len()) as u64;
+    let n = n_faces + n_tets + n_embedded;
     stream.text(&format!("\n$EndNodes\n$Elements\n{n}\n"));
     elements(mesh, &mut stream)?;
     stream.text("\n$EndElements\n");
@@ -88,19 +88,19 @@ fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
         })?;
     }
     // Edges and points are put into the first partition, because the format needs one.
-    let wires = mesh.wires();
-    if !wires.edges.is_empty() {
-        put(stream, &[LINE, wires.edges.len() as u32, n_tags]);
-        for (ends, label) in &wires.edges {
+    let embedded = mesh.embedded();
+    if !embedded.edges.is_empty() {
+        put(stream, &[LINE, embedded.edges.len() as u32, n_tags]);
+        for (ends, label) in &embedded.edges {
             number += 1;
             put_head(stream, number, label + 1, 0);
             put(stream, &ends.map(|v| v as u32 + 1));
             stream.end()?;
         }
     }
-    if !wires.points.is_empty() {
-        put(stream, &[POINT, wires.points.len() as u32, n_tags]);
-        for (place, point) in (1u32..).zip(&wires.points) {
+    if !embedded.points.is_empty() {
+        put(stream, &[POINT, embedded.points.len() as u32, n_tags]);
+        for (place, point) in (1u32..).zip(&embedded.points) {
             number += 1;
             put(stream, &[number, point.label + 1, place]);
             if partitioned {
@@ -115,23 +115,8 @@ fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
 
 /// The section that names labels (dimension 2) and regions (dimension 3).
 fn physical_names(mesh: &mut Merged) -> Result<String> {
-    let labels = mesh.labels();
     let regions = mesh.regions()?;
-    let points = mesh.wires().point_labels().into_keys().map(|l| (0, l));
-    let edges = mesh.wires().edge_labels().into_keys().map(|l| (1, l));
-    let wires: Vec<(u32, u32)> = points.chain(edges).collect();
-    let n = wires.len() + labels.len() + regions.len();
-    let mut text = format!("$PhysicalNames\n{n}\n");
-    for (dim, label) in wires {
-        let name = mesh.label_name(label);
-        text += &format!("{dim} {} \"{}\"\n", label + 1, quotable(&name));
-    }
-    for (label, name) in labels {
-        text += &format!("2 {} \"{}\"\n", label + 1, quotable(&name));
-    }
-    for region in regions {
-        let name = quotable(&mesh.region_name(region));
-        text += &format!("3 {region} \"{name}\"\n");
-    }
-    Ok(text + "$EndPhysicalNames\n")
+    let labels = mesh.labels().into_keys();
+    let names = gmsh::physical_names(mesh, mesh.embedded(), labels, regions);
+    Ok(format!("$PhysicalNames\n{names}$EndPhysicalNames\n"))
 }

@@ -95,7 +95,7 @@ impl Medit for BinaryMedit {
 
 /// The reference of an embedded point is its label + 1, that of other vertices 0.
 fn vertices(mesh: &mut Merged, file: &mut impl Medit) -> Result<()> {
-    let points = mesh.wires().points.iter();
+    let points = mesh.embedded().points.iter();
     let mut points: Vec<(u64, u32)> = points.map(|p| (p.vertex, p.label)).collect();
     points.sort_unstable();
     let mut points = points.into_iter().peekable();
@@ -107,17 +107,17 @@ fn vertices(mesh: &mut Merged, file: &mut impl Medit) -> Result<()> {
     })
 }
 
-fn wires(mesh: &Merged, file: &mut impl Medit) -> Result<()> {
-    let wires = mesh.wires();
-    if !wires.edges.is_empty() {
-        file.section(EDGES, wires.edges.len() as u64, 24);
-        for (ends, label) in &wires.edges {
+fn embedded(mesh: &Merged, file: &mut impl Medit) -> Result<()> {
+    let embedded = mesh.embedded();
+    if !embedded.edges.is_empty() {
+        file.section(EDGES, embedded.edges.len() as u64, 24);
+        for (ends, label) in &embedded.edges {
             file.element(ends, u64::from(*label) + 1)?;
         }
     }
-    if !wires.points.is_empty() {
-        file.section(REQUIRED_VERTICES, wires.points.len() as u64, 8);
-        for point in &wires.points {
+    if !embedded.points.is_empty() {
+        file.section(REQUIRED_VERTICES, embedded.points.len() as u64, 8);
+        for point in &embedded.points {
             file.listed(point.vertex)?;
         }
     }
@@ -127,7 +127,7 @@ fn wires(mesh: &Merged, file: &mut impl Medit) -> Result<()> {
 fn sections(mesh: &mut Merged, file: &mut impl Medit) -> Result<()> {
     mesh.expect_passes(1, 1);
     vertices(mesh, file)?;
-    wires(mesh, file)?;
+    embedded(mesh, file)?;
     file.section(TRIANGLES, mesh.n_faces(), 32);
     mesh.faces().each(|face| file.element(&face.vertices, u64::from(face.label) + 1))?;
     file.section(TETRAHEDRA, mesh.n_tets(), 40);

@@ -9,12 +9,12 @@ use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
 use super::doubles::Doubles;
+use super::embedded::{WrittenEmbedded, memory_left};
 use super::error::{Result, WriteError};
 use super::faces::{FaceSorter, FaceSource, MergedFace, MergedFaces};
 use super::merged_parts::{collect_faces, misplaced, required_faces, sources};
 use super::numbering::{Numbering, PartNumbers, Sharer, Source, shareable_vertices, sharers};
 use super::scope::{FaceSet, Scope};
-use super::wires::{WrittenEmbedded, memory_left};
 use tetdb_base::shape::excess_near;
 use tetdb_base::storage::{Sorted, check_cancelled};
 use tetdb_schema::catalog::SubdomainRow;
@@ -94,7 +94,7 @@ pub(super) struct Merged<'a> {
     numbering: Numbering,
     faces: MergedFaces,
     doubles: Option<Doubles>,
-    wires: WrittenEmbedded,
+    embedded: WrittenEmbedded,
     support_first: u64,
     label_names: Vec<String>,
     region_names: Vec<String>,
@@ -122,7 +122,7 @@ impl<'a> Merged<'a> {
         let parts = sources(store, scope, dir, memory)?;
         let numbering = Numbering::new(store, &parts, scope.apart, dir, memory)?;
         let first_label = label_names.len() as u32;
-        let mut wires = WrittenEmbedded::gather(store, &row, (&parts, &numbering), memory)?;
+        let mut embedded = WrittenEmbedded::gather(store, &row, (&parts, &numbering), memory)?;
         let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
         let with_faces = scope.faces != FaceSet::Nothing;
         for (p, source) in parts.iter().enumerate().filter(|_| with_faces) {
@@ -142,7 +142,7 @@ impl<'a> Merged<'a> {
             numbering,
             faces,
             doubles: None,
-            wires: WrittenEmbedded::default(),
+            embedded: WrittenEmbedded::default(),
             support_first: row.fin_first,
             label_names,
             region_names,
@@ -150,21 +150,21 @@ impl<'a> Merged<'a> {
             memory,
             progress,
         };
-        if !wires.edges.is_empty() && !is_whole {
-            let mut edges = wires.edges_to_find();
+        if !embedded.edges.is_empty() && !is_whole {
+            let mut edges = embedded.edges_to_find();
             mesh.tets(|tet| {
                 edges.find(tet.nodes);
                 Ok(())
             })?;
-            wires.keep_found(&edges);
+            embedded.keep_found(&edges);
         }
-        mesh.wires = wires;
+        mesh.embedded = embedded;
         Ok(mesh)
     }
 
     /// The written embedded edges and points.
-    pub fn wires(&self) -> &WrittenEmbedded {
-        &self.wires
+    pub fn embedded(&self) -> &WrittenEmbedded {
+        &self.embedded
     }
 
     /// Number of the first support triangle: facets from here on hold embedded edges and are no input triangles.

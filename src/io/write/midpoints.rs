@@ -175,7 +175,7 @@ fn element_edges(mesh: &mut Merged, has_lines: bool) -> Result<Sorted<ElementEdg
     let mut edges = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     let mut push =
         |[a, b]: [u64; 2], place| edges.push(ElementEdge { low: a.min(b), high: a.max(b), place });
-    let lines = mesh.wires().edges.iter().filter(|_| has_lines);
+    let lines = mesh.embedded().edges.iter().filter(|_| has_lines);
     for (place, (ends, _)) in (LINE..).zip(lines) {
         push(*ends, place)?;
     }

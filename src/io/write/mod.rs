@@ -14,6 +14,8 @@ mod abaqus;
 mod columns;
 mod dispatch;
 mod doubles;
+mod embedded;
+mod embedded_list;
 mod error;
 mod faces;
 mod foam;
@@ -45,8 +47,6 @@ mod tests;
 mod tetgen;
 mod topology;
 mod vtk;
-mod wires;
-mod wires_list;
 mod writers;
 
 use std::collections::BTreeSet;

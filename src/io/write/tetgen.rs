@@ -50,12 +50,12 @@ pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) ->
         faces.end()
     })?;
     faces.finish()?;
-    let wires = mesh.wires();
-    if wires.edges.is_empty() {
+    let embedded = mesh.embedded();
+    if embedded.edges.is_empty() {
         return Ok(());
     }
-    let mut edges = begin("edge", 0, format!("{} 1\n", wires.edges.len()))?;
-    for (number, (ends, label)) in (0u64..).zip(&wires.edges) {
+    let mut edges = begin("edge", 0, format!("{} 1\n", embedded.edges.len()))?;
+    for (number, (ends, label)) in (0u64..).zip(&embedded.edges) {
         edges.integer(number, b' ');
         ends.iter().for_each(|&v| edges.integer(v, b' '));
         edges.integer(u64::from(*label) + 1, b'\n');

@@ -19,7 +19,7 @@ type DoubledSide = (u32, u8);
 
 /// The triangles of one part of the mesh.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
-pub(super) struct SeenTriangles {
+pub(super) struct FoundTriangles {
     /// Place and bits of the words that are not all zero, as in [`Input`].
     words: Vec<(u32, [u64; 3])>,
     doubled: Vec<DoubledSide>,
@@ -57,17 +57,17 @@ impl<'a> Input<'a> {
     }
 
     /// Returns the found triangles, for [`add`](Self::add) in another process.
-    pub(super) fn into_seen(self) -> SeenTriangles {
+    pub(super) fn into_found(self) -> FoundTriangles {
         let word = |at: usize| (at as u32, self.seen.each_ref().map(|bits| bits[at]));
         let words = (0..self.seen[0].len()).map(word);
-        SeenTriangles {
+        FoundTriangles {
             words: words.filter(|(_, bits)| *bits != [0; 3]).collect(),
             doubled: self.doubled,
         }
     }
 
     /// Adds the triangles found in another part of the mesh.
-    pub(super) fn add(&mut self, other: SeenTriangles) {
+    pub(super) fn add(&mut self, other: FoundTriangles) {
         self.doubled.extend(other.doubled);
         for (at, bits) in other.words {
             for (side, more) in (0..).zip(bits) {

@@ -12,11 +12,12 @@
 //! Sub-domains are verified one by one, by any process; their findings are added up in order.
 //!
 //! Reading order: [`Report`] (what is found), `pass` (once through a sub-domain), `part_report` (what is found there), `pairing` (faces across chunks), `interface` (faces across
-//! sub-domains), `against` and `wires` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
+//! sub-domains), `against` and `embedded` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
 
 mod against;
 mod compare;
 mod damage;
+mod embedded;
 mod interface;
 mod options;
 mod pairing;
@@ -26,16 +27,15 @@ mod report;
 mod rows;
 #[cfg(test)]
 mod tests;
-mod wires;
 
 use std::path::{Path, PathBuf};
 
 pub use compare::{Population, Qualities, qualities};
 pub use damage::damage;
+pub use embedded::wire_bytes;
 pub use options::VerifyOptions;
 pub use part_report::PartReport;
 pub use report::{Finding, Level, Offender, Report};
-pub use wires::wire_bytes;
 
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::digest::Digest;

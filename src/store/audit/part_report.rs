@@ -1,9 +1,9 @@
 //! The findings of one sub-domain, to be added to those of the others by any process.
 
 use super::Report;
-use super::against::SeenTriangles;
+use super::against::FoundTriangles;
+use super::embedded::FoundEmbedded;
 use super::interface::InterfaceSides;
-use super::wires::SeenWires;
 
 /// The findings of one sub-domain. Memory: its interface faces, and bits for its facets.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
@@ -15,8 +15,8 @@ pub struct PartReport {
     pub(super) volumes: MeshVolumes,
     pub(super) interfaces: InterfaceSides,
     /// `None` without an input to compare with.
-    pub(super) triangles: Option<SeenTriangles>,
-    pub(super) wires: Option<SeenWires>,
+    pub(super) triangles: Option<FoundTriangles>,
+    pub(super) embedded: Option<FoundEmbedded>,
 }
 
 /// MeshVolumes of a sub-domain, or the sums of those of several.

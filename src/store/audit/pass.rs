@@ -8,11 +8,11 @@ use tetdb_schema::digest::Digest;
 use tetdb_schema::record::{FACES, NO_TET, SealedTet};
 
 use super::against::{Input, check_owners};
+use super::embedded::EmbeddedSearch;
 use super::interface::InterfaceAudit;
 use super::pairing::{OpenSide, OpenSides};
 use super::part_report::{MeshVolumes, PartReport};
 use super::rows::{Rederived, RegionSums, check_regions};
-use super::wires::WireSearch;
 use super::{Finding, Level, Report, VerifyOptions};
 use crate::sealed::{
     BitSet, Corner, FaceJoin, FaceJoinSorter, FacePairs, Paired, Subdomain, sorted_face,
@@ -36,7 +36,7 @@ pub(super) struct Audit<'a> {
     options: &'a VerifyOptions,
     scratch: &'a Path,
     input: Option<Input<'a>>,
-    wires: Option<WireSearch<'a>>,
+    embedded: Option<EmbeddedSearch<'a>>,
     interfaces: InterfaceAudit,
     pairs: FacePairs,
     report: Report,
@@ -67,7 +67,7 @@ impl<'a> Audit<'a> {
             options,
             scratch,
             input: surface.map(Input::new),
-            wires: surface.and_then(WireSearch::new),
+            embedded: surface.and_then(EmbeddedSearch::new),
             interfaces: InterfaceAudit::new(scratch, options.memory_bytes / 16),
             pairs: FacePairs::new(SealedTet::COUNT_MAX),
             report,
@@ -208,8 +208,8 @@ impl<'a> Audit<'a> {
                 let c = part.corners(tet.nodes)?;
                 used.insert_all(tet.nodes);
                 self.distinct(rank, chunk.first + i as u32, tet, &c);
-                if let Some(wires) = &mut self.wires {
-                    wires.see(&c);
+                if let Some(embedded) = &mut self.embedded {
+                    embedded.see(&c);
                 }
                 corners.push(c);
             }
@@ -460,8 +460,8 @@ impl<'a> Audit<'a> {
                 .collect(),
             volumes: self.volumes,
             interfaces: self.interfaces.into_sides()?,
-            triangles: self.input.take().map(Input::into_seen),
-            wires: self.wires.take().map(WireSearch::into_seen),
+            triangles: self.input.take().map(Input::into_found),
+            embedded: self.embedded.take().map(EmbeddedSearch::into_found),
             report: self.report,
         })
     }
@@ -482,8 +482,8 @@ impl<'a> Audit<'a> {
         if let (Some(input), Some(seen)) = (&mut self.input, part.triangles) {
             input.add(seen);
         }
-        if let (Some(wires), Some(seen)) = (&mut self.wires, part.wires) {
-            wires.add(&seen);
+        if let (Some(embedded), Some(seen)) = (&mut self.embedded, part.embedded) {
+            embedded.add(&seen);
         }
         Ok(())
     }
@@ -512,8 +512,8 @@ impl<'a> Audit<'a> {
             if let Some(input) = self.input.take() {
                 input.finish(&mut self.report);
             }
-            if let Some(wires) = self.wires.take() {
-                wires.finish(&mut self.report);
+            if let Some(embedded) = self.embedded.take() {
+                embedded.finish(&mut self.report);
             }
         }
         self.report.digest = self.digests[0].to_string();

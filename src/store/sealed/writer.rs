@@ -253,15 +253,10 @@ impl SealedWriter {
     pub fn push_facet(&mut self, facet: SealedFacet) -> Result<(), SealedError> {
         let cut = self.facets.push(facet, SealedFacet::to_working);
         if let Some(chunk) = cut.map_err(self.io())? {
-            self.put_facets(chunk)?;
+            self.facet_chunks.push(summary(&chunk));
+            self.put(chunk.values)?;
         }
         Ok(())
-    }
-
-    fn put_facets(&mut self, chunk: Cut<SealedFacet>) -> Result<(), SealedError> {
-        self.facet_chunks
-            .push(RangeSummary { first: chunk.first, count: chunk.records.len() as u32 });
-        self.put(chunk.values)
     }
 
     /// Adds an interface face.
@@ -277,15 +272,10 @@ impl SealedWriter {
         let rank = self.subdomain.rank();
         let cut = self.faces.push(face, |face| face.to_working(rank));
         if let Some(chunk) = cut.map_err(self.io())? {
-            self.put_faces(chunk)?;
+            self.face_chunks.push(summary(&chunk));
+            self.put(chunk.values)?;
         }
         Ok(())
-    }
-
-    fn put_faces(&mut self, chunk: Cut<InterfaceFace>) -> Result<(), SealedError> {
-        self.face_chunks
-            .push(RangeSummary { first: chunk.first, count: chunk.records.len() as u32 });
-        self.put(chunk.values)
     }
 
     fn put_summaries<R: ChunkRecord>(&mut self, summaries: &[R]) -> Result<u32, SealedError> {
@@ -317,10 +307,12 @@ impl SealedWriter {
         let mut none = std::iter::empty();
         self.push_tets::<SealedError>(&mut none)?;
         while let Some(chunk) = self.facets.cut().map_err(&io)? {
-            self.put_facets(chunk)?;
+            self.facet_chunks.push(summary(&chunk));
+            self.put(chunk.values)?;
         }
         while let Some(chunk) = self.faces.cut().map_err(&io)? {
-            self.put_faces(chunk)?;
+            self.face_chunks.push(summary(&chunk));
+            self.put(chunk.values)?;
         }
         let tets = std::mem::take(&mut self.tet_chunks);
         let vertices = std::mem::take(&mut self.vertex_chunks);
@@ -365,6 +357,10 @@ impl SealedWriter {
         };
         Ok(Sealed { row, regions: totals.regions, interfaces })
     }
+}
+
+fn summary<R, const IS_FACE: bool>(chunk: &Cut<R>) -> RangeSummary<IS_FACE> {
+    RangeSummary { first: chunk.first, count: chunk.records.len() as u32 }
 }
 
 /// The kinds of chunks in the order of [`SubdomainRow::chunks`].

@@ -371,14 +371,12 @@ impl Catalog {
 
     /// State of the store.
     pub fn state(&mut self) -> Result<StoreState, StoreError> {
-        let state = self.row(RowKind::State.key(0, 0))?;
-        state.ok_or_else(|| self.missing(RowKind::State.key(0, 0)))
+        self.needed(RowKind::State)
     }
 
     /// The job: source and options of the mesh.
     pub fn job(&mut self) -> Result<Job, StoreError> {
-        let job = self.row(RowKind::Job.key(0, 0))?;
-        job.ok_or_else(|| self.missing(RowKind::Job.key(0, 0)))
+        self.needed(RowKind::Job)
     }
 
     /// Names of the labels; a facet's label is a position here.
@@ -436,7 +434,7 @@ impl Catalog {
             true if !are_counts(counts) => "counts more than a sub-domain can have",
             true => return Ok(()),
         };
-        Err(self.damaged_row(RowKind::Subdomain.key(0, row.rank), reason.to_owned()))
+        Err(self.damaged_row(RowKind::Subdomain.key(0, row.rank), reason))
     }
 
     /// Refuses a row that no coarse snapshot can have.
@@ -444,7 +442,7 @@ impl Catalog {
         match are_counts([row.tets, row.vertices, row.facets, row.interface_faces]) {
             true => Ok(()),
             false => {
-                let reason = "counts more than a sub-domain can have".to_owned();
+                let reason = "counts more than a sub-domain can have";
                 Err(self.damaged_row(RowKind::Coarse.key(0, row.rank), reason))
             }
         }
@@ -615,12 +613,19 @@ impl Catalog {
         Ok(self.file.compact()?)
     }
 
-    fn missing(&self, key: u64) -> StoreError {
-        self.damaged_row(key, "is missing".to_owned())
+    fn damaged_row(&self, key: u64, reason: impl Into<String>) -> StoreError {
+        StoreError::Row { path: self.file.path().to_owned(), key, reason: reason.into() }
     }
 
-    fn damaged_row(&self, key: u64, reason: String) -> StoreError {
-        StoreError::Row { path: self.file.path().to_owned(), key, reason }
+    /// The only row of a kind. Errors: damage, or there is none.
+    fn needed<T>(&mut self, kind: RowKind) -> Result<T, StoreError>
+    where
+        T: Archive,
+        T::Archived: for<'a> CheckBytes<HighValidator<'a, rancor::Error>>
+            + Deserialize<T, HighDeserializer<rancor::Error>>,
+    {
+        let key = kind.key(0, 0);
+        self.row(key)?.ok_or_else(|| self.damaged_row(key, "is missing"))
     }
 
     fn bytes(&mut self, key: u64) -> Result<Option<Vec<u8>>, StoreError> {

@@ -1,9 +1,9 @@
 //! Triangles and tetrahedra, entity by entity.
 
+use super::super::embedded::WrittenEmbedded;
 use super::super::error::Result;
 use super::super::merged::{Merged, OpenedPart};
 use super::super::midpoints::{ElementEdges, Midpoints};
-use super::super::wires::WrittenEmbedded;
 use super::entities::Entities;
 use super::out::Out;
 use super::piece::GmshPiece;
@@ -58,12 +58,12 @@ pub(super) fn write(
 ) -> Result<()> {
     let n_faces = mesh.n_faces();
     let tags = entities.tags();
-    let wires = &entities.wires;
-    let n_wires = (wires.edges.len() + wires.points.len()) as u64;
-    let curves = wires.edge_labels();
-    let blocks = tags.len() + curves.len() + wires.points.len();
-    let total = entities.n_faces() + entities.n_tets() + n_wires;
-    for n in [blocks as u64, total, 1, n_faces + mesh.n_tets() + n_wires] {
+    let embedded = &entities.embedded;
+    let n_embedded = (embedded.edges.len() + embedded.points.len()) as u64;
+    let curves = embedded.edge_labels();
+    let blocks = tags.len() + curves.len() + embedded.points.len();
+    let total = entities.n_faces() + entities.n_tets() + n_embedded;
+    for n in [blocks as u64, total, 1, n_faces + mesh.n_tets() + n_embedded] {
         out.size(n);
     }
     out.end()?;
@@ -111,9 +111,9 @@ pub(super) fn write(
         elements.tet(entity, ghost.number, ghost.nodes.0)
     })?;
     let n_before = n_faces + mesh.n_tets();
-    lines(mesh, out, piece, (wires, n_before))?;
-    let mut number = n_before + wires.edges.len() as u64;
-    for (tag, point) in (1u32..).zip(&wires.points) {
+    lines(mesh, out, piece, (embedded, n_before))?;
+    let mut number = n_before + embedded.edges.len() as u64;
+    for (tag, point) in (1u32..).zip(&embedded.points) {
         for word in [0, tag, POINT] {
             out.int(word);
         }
@@ -129,11 +129,11 @@ fn lines(
     mesh: &Merged,
     out: &mut Out,
     piece: &GmshPiece,
-    (wires, n_before): (&WrittenEmbedded, u64),
+    (embedded, n_before): (&WrittenEmbedded, u64),
 ) -> Result<()> {
     let mut midpoints = piece.midpoints.map(Midpoints::lines).transpose()?;
-    let mut edges = (n_before + 1..).zip(&wires.edges);
-    for (label, n) in wires.edge_labels() {
+    let mut edges = (n_before + 1..).zip(&embedded.edges);
+    for (label, n) in embedded.edge_labels() {
         for word in [1, label + 1, LINES[usize::from(midpoints.is_some())]] {
             out.int(word);
         }

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::super::embedded::WrittenEmbedded;
 use super::super::error::Result;
 use super::super::faces::MergedFace;
 use super::super::merged::Merged;
 use super::super::names::quotable;
-use super::super::wires::WrittenEmbedded;
 use super::out::Out;
 use super::piece::GmshPiece;
 
@@ -29,7 +29,7 @@ pub(super) struct Entities {
     n_labels: u32,
     /// Embedded edges and points: edges are in a curve for each label, each point is an entity of its own, numbered from 1. A file of one
     /// partition has none.
-    pub wires: WrittenEmbedded,
+    pub embedded: WrittenEmbedded,
 }
 
 impl Entities {
@@ -42,10 +42,10 @@ impl Entities {
             bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             ranks: parts.iter().map(|part| part.rank).collect(),
             n_labels: mesh.n_labels(),
-            wires: WrittenEmbedded::default(),
+            embedded: WrittenEmbedded::default(),
         };
         if piece.which.len() == parts.len() {
-            entities.wires = mesh.wires().clone();
+            entities.embedded = mesh.embedded().clone();
         }
         let here: BTreeSet<u32> = piece.which.iter().map(|&p| parts[p].rank).collect();
         let mut surfaces = BTreeMap::<_, u64>::new();
@@ -152,23 +152,7 @@ impl Entities {
     }
 
     pub fn physical_names(&self, mesh: &Merged) -> String {
-        let (labels, regions) = (self.labels(), self.regions());
-        let points = self.wires.point_labels().into_keys().map(|l| (0, l));
-        let edges = self.wires.edge_labels().into_keys().map(|l| (1, l));
-        let wires: Vec<(u32, u32)> = points.chain(edges).collect();
-        let n = wires.len() + labels.len() + regions.len();
-        let mut text = format!("{n}\n");
-        for (dim, label) in wires {
-            let name = mesh.label_name(label);
-            text += &format!("{dim} {} \"{}\"\n", label + 1, quotable(&name));
-        }
-        for label in labels {
-            text += &format!("2 {} \"{}\"\n", label + 1, quotable(&mesh.label_name(label)));
-        }
-        for region in regions {
-            text += &format!("3 {region} \"{}\"\n", quotable(&mesh.region_name(region)));
-        }
-        text
+        physical_names(mesh, &self.embedded, self.labels(), self.regions())
     }
 
     fn put_bounds(&self, out: &mut Out) {
@@ -178,8 +162,8 @@ impl Entities {
     /// Writes labels and regions as surfaces and volumes: tag, bounds, physical tag, no bounding entities.
     pub fn write_model(&self, out: &mut Out) -> Result<()> {
         let (labels, regions) = (self.labels(), self.regions());
-        let curves = self.wires.edge_labels();
-        let points = &self.wires.points;
+        let curves = self.embedded.edge_labels();
+        let points = &self.embedded.points;
         for n in [points.len(), curves.len(), labels.len(), regions.len()] {
             out.size(n as u64);
         }
@@ -253,4 +237,23 @@ impl Entities {
         out.size(0);
         out.end()
     }
+}
+
+/// Number and names of physical groups: points (dimension 0), edges (1) and surfaces (2) by label, volumes (3) by region.
+pub(in crate::write) fn physical_names(
+    mesh: &Merged,
+    embedded: &WrittenEmbedded,
+    labels: impl IntoIterator<Item = u32>,
+    regions: impl IntoIterator<Item = u32>,
+) -> String {
+    let points = embedded.point_labels().into_keys().map(|label| (0, label));
+    let edges = embedded.edge_labels().into_keys().map(|label| (1, label));
+    let surfaces = labels.into_iter().map(|label| (2, label));
+    let labelled = points.chain(edges).chain(surfaces);
+    let labelled = labelled.map(|(dim, label)| (dim, label + 1, mesh.label_name(label)));
+    let volumes = regions.into_iter().map(|region| (3, region, mesh.region_name(region)));
+    let lines: Vec<String> = (labelled.chain(volumes))
+        .map(|(dim, tag, name)| format!("{dim} {tag} \"{}\"\n", quotable(&name)))
+        .collect();
+    format!("{}\n{}", lines.len(), lines.concat())
 }

@@ -22,6 +22,7 @@ use super::output_files::OutputFiles;
 use super::report::FileCounts;
 use super::selection::ExportSelection;
 use entities::Entities;
+pub(super) use entities::physical_names;
 use ghosts::Ghosts;
 use out::Out;
 use piece::GmshPiece;

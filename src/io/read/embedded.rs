@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::error::{FilePlace, ReadFault};
 use super::feed::{Feed, Result, name, parse};
 use super::open::{Reader, open, stem, unpacked_name};
-use super::wire_sink::{WireKind, WireSink};
 use super::{obj, tetgen, vtk};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::WireSet;
@@ -16,11 +16,11 @@ use tetdb_base::surface::WireSet;
 /// The first [`ReadError`](super::ReadError) with its place; a file without any is one.
 pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
     let mut feed = open(path, cap / 4)?;
-    let mut sink = WireSink::called(stem(path), cap / 4);
+    let mut sink = EmbeddedSink::called(stem(path), cap / 4);
     let named = unpacked_name(path);
     let extension = named.extension().unwrap_or_default().to_string_lossy();
     match (extension.to_ascii_lowercase().as_str(), kind) {
-        ("obj", _) => obj::read_wires(feed, kind, &mut sink)?,
+        ("obj", _) => obj::read_embedded(feed, kind, &mut sink)?,
         ("vtk", _) => vtk::read(feed, kind, &mut sink)?,
         ("poly", WireKind::Edges) => {
             let nodes = named.with_extension("node");
@@ -47,7 +47,7 @@ pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
 }
 
 /// Lines of three numbers, and a name behind them; between them commas, semicolons or blanks. A first line of words is a heading.
-fn read_table(feed: &mut Feed<Reader>, sink: &mut WireSink) -> Result<()> {
+fn read_table(feed: &mut Feed<Reader>, sink: &mut EmbeddedSink) -> Result<()> {
     let mut line = Vec::new();
     let mut is_first = true;
     loop {

@@ -10,7 +10,7 @@ use tetdb_base::surface::Surface;
 const BYTES_EACH: u64 = 100;
 
 /// A search for embedded edges and points.
-pub(super) struct WireSearch<'a> {
+pub(super) struct EmbeddedSearch<'a> {
     surface: &'a Surface,
     /// Embedded edges by their vertices, the lower number first: number of the edge, and true if the mesh has it.
     edges: HashMap<[u32; 2], (usize, bool)>,
@@ -20,7 +20,7 @@ pub(super) struct WireSearch<'a> {
 
 /// The edges and points of one part of the mesh.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
-pub(super) struct SeenWires {
+pub(super) struct FoundEmbedded {
     /// The vertices of each edge, the lower number first.
     edges: Vec<[u32; 2]>,
     vertices: Vec<u32>,
@@ -32,7 +32,7 @@ pub fn wire_bytes(surface: &Surface) -> u64 {
     BYTES_EACH * (wires.edges.len() + wires.points.len()) as u64
 }
 
-impl<'a> WireSearch<'a> {
+impl<'a> EmbeddedSearch<'a> {
     /// Returns `None` where the surface has no embedded edges and points.
     pub fn new(surface: &'a Surface) -> Option<Self> {
         let wires = &surface.wires;
@@ -53,42 +53,42 @@ impl<'a> WireSearch<'a> {
         let bits = |p: tetdb_base::geom::Point| p.to_array().map(f64::to_bits);
         let found = corners.each_ref().map(|corner| {
             let v = corner.input_index()?;
-            let (_, is_seen) = self.vertices.get_mut(&v)?;
+            let (_, is_found) = self.vertices.get_mut(&v)?;
             let is_there = bits(self.surface.points[v as usize]) == bits(corner.point);
-            *is_seen |= is_there;
+            *is_found |= is_there;
             is_there.then_some(v)
         });
         for i in 0..4 {
             for j in i + 1..4 {
                 if let (Some(a), Some(b)) = (found[i], found[j])
-                    && let Some((_, is_seen)) = self.edges.get_mut(&[a.min(b), a.max(b)])
+                    && let Some((_, is_found)) = self.edges.get_mut(&[a.min(b), a.max(b)])
                 {
-                    *is_seen = true;
+                    *is_found = true;
                 }
             }
         }
     }
 
     /// Returns the found edges and vertices, for [`add`](Self::add) in another process.
-    pub fn into_seen(self) -> SeenWires {
-        let edges = self.edges.into_iter().filter(|(_, (_, is_seen))| *is_seen);
-        let vertices = (self.vertices.into_iter()).filter(|(_, (_, is_seen))| *is_seen);
-        SeenWires {
+    pub fn into_found(self) -> FoundEmbedded {
+        let edges = self.edges.into_iter().filter(|(_, (_, is_found))| *is_found);
+        let vertices = (self.vertices.into_iter()).filter(|(_, (_, is_found))| *is_found);
+        FoundEmbedded {
             edges: edges.map(|(ends, _)| ends).collect(),
             vertices: vertices.map(|(v, _)| v).collect(),
         }
     }
 
     /// Adds the edges and vertices found in another part of the mesh.
-    pub fn add(&mut self, other: &SeenWires) {
+    pub fn add(&mut self, other: &FoundEmbedded) {
         for ends in &other.edges {
-            if let Some((_, is_seen)) = self.edges.get_mut(ends) {
-                *is_seen = true;
+            if let Some((_, is_found)) = self.edges.get_mut(ends) {
+                *is_found = true;
             }
         }
         for v in &other.vertices {
-            if let Some((_, is_seen)) = self.vertices.get_mut(v) {
-                *is_seen = true;
+            if let Some((_, is_found)) = self.vertices.get_mut(v) {
+                *is_found = true;
             }
         }
     }
@@ -97,28 +97,28 @@ impl<'a> WireSearch<'a> {
     pub fn finish(self, report: &mut Report) {
         let wires = &self.surface.wires;
         let mut edges = vec![false; wires.edges.len()];
-        self.edges.values().for_each(|&(e, is_seen)| edges[e] = is_seen);
+        self.edges.values().for_each(|&(e, is_found)| edges[e] = is_found);
         let mut points = vec![false; wires.points.len()];
-        for &(point, is_seen) in self.vertices.values() {
+        for &(point, is_found) in self.vertices.values() {
             if let Some(i) = point {
-                points[i] = is_seen;
+                points[i] = is_found;
             }
         }
-        report.edges_present = edges.iter().filter(|&&is_seen| is_seen).count() as u64;
-        report.points_present = points.iter().filter(|&&is_seen| is_seen).count() as u64;
+        report.edges_present = edges.iter().filter(|&&is_found| is_found).count() as u64;
+        report.points_present = points.iter().filter(|&&is_found| is_found).count() as u64;
         report.edges_missing = edges.len() as u64 - report.edges_present;
         report.points_missing = points.len() as u64 - report.points_present;
         let mut lose = |finding, what: String, vertices: &[u32]| {
             let point = |&v: &u32| self.surface.points[v as usize];
             report.find(finding, None, what).with_points(vertices.iter().map(point));
         };
-        for (e, _) in edges.iter().enumerate().filter(|(_, is_seen)| !**is_seen) {
+        for (e, _) in edges.iter().enumerate().filter(|(_, is_found)| !**is_found) {
             let [a, b, _] = wires.edges[e];
             let what =
                 format!("embedded {} is no edge of a tetrahedron", self.surface.edge_name(e));
             lose(Finding::MissingEdge, what, &[a, b]);
         }
-        for (i, _) in points.iter().enumerate().filter(|(_, is_seen)| !**is_seen) {
+        for (i, _) in points.iter().enumerate().filter(|(_, is_found)| !**is_found) {
             let what =
                 format!("embedded {} is no vertex of a tetrahedron", self.surface.point_name(i));
             lose(Finding::MissingPoint, what, &wires.points[i][..1]);

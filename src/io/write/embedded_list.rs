@@ -9,8 +9,8 @@ use super::stream::Stream;
 
 /// Writes `NAME_wires.csv`: the name of each edge and point and the numbers of its vertices, from 0. Errors: the disk.
 pub(super) fn write_list(mesh: &Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
-    let wires = mesh.wires();
-    if wires.is_empty() {
+    let embedded = mesh.embedded();
+    if embedded.is_empty() {
         return Ok(());
     }
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
@@ -18,11 +18,11 @@ pub(super) fn write_list(mesh: &Merged, outputs: &mut OutputFiles, out: &Path) -
     let mut stream = Stream::open(&path)?;
     stream.text("kind,name,vertex,to\n");
     let name = |label| mesh.label_name(label).replace('"', "\"\"").replace(['\n', '\r'], " ");
-    for ([a, b], label) in &wires.edges {
+    for ([a, b], label) in &embedded.edges {
         stream.text(&format!("edge,\"{}\",{a},{b}\n", name(*label)));
         stream.end()?;
     }
-    for point in &wires.points {
+    for point in &embedded.points {
         stream.text(&format!("point,\"{}\",{},\n", name(point.label), point.vertex));
         stream.end()?;
     }

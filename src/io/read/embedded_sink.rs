@@ -16,7 +16,7 @@ pub enum WireKind {
 
 /// Edges or points being read.
 #[derive(Default)]
-pub(super) struct WireSink {
+pub(super) struct EmbeddedSink {
     pub set: WireSet,
     /// Name of elements without a name of their own.
     stem: String,
@@ -24,7 +24,7 @@ pub(super) struct WireSink {
     bytes_max: u64,
 }
 
-impl WireSink {
+impl EmbeddedSink {
     /// A target for a file of this name, of at most so many bytes.
     pub fn called(stem: String, bytes_max: u64) -> Self {
         Self { stem, bytes_max, ..Self::default() }
