@@ -1,7 +1,7 @@
 //! Wavefront OBJ: `v` and `f` lines; groups, objects or materials as labels.
 //!
-//! A face names vertices from 1, or backwards from the last one as −1, with texture and normal
-//! numbers after slashes, which are passed over. A backslash continues a line.
+//! A face names vertices from 1, or backwards from the last one as −1. Texture and normal numbers after slashes are skipped. A backslash
+//! continues a line.
 
 use std::io::BufRead;
 

@@ -38,7 +38,7 @@ pub fn size_files(path: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
             None => refuse(ReadFault::Alone(path.with_extension("sol").display().to_string())),
         },
         _ => refuse(ReadFault::UnknownFormat(
-            "sizes are read from .sol or .solb, with their mesh beside them, and by `tetdb resaturate` also from .npy",
+            "sizes are read from .sol or .solb, with their mesh beside them; new sizes for sub-domains also from .npy",
         )),
     }
 }

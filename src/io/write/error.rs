@@ -143,7 +143,7 @@ impl WriteError {
             Self::UnknownFormat { .. } => "end the name with one of those that are expected",
             Self::Unsupported { .. } => "choose another format, or leave that option out",
             Self::Lossy { .. } => "choose .ply, .obj, .off or .stl (text), which keep doubles",
-            Self::NoRegion { .. } => "choose one of those that `tetdb info` lists as filled",
+            Self::NoRegion { .. } => "choose one of the store's filled regions",
             Self::TooLarge { .. } => "export to .vtu or .meshb, whose numbers have 64 bits",
             Self::NoSpace { .. } | Self::DiskFull { .. } => {
                 "free some space, or export to another disk; compare with `df -h`"

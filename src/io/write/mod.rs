@@ -1,11 +1,10 @@
 //! Meshes and surfaces as files for other programs.
 //!
-//! A store becomes one conforming mesh: vertices and tetrahedra numbered densely in (sub-domain,
-//! local) order, a vertex that several sub-domains share once, and every input triangle that bounds
-//! a filled region as a boundary face, in the order of the input. Or each sub-domain becomes a mesh of its own, numbered as in the
-//! store, and the faces that it shares with others are boundary faces too. All is streamed: memory does not
-//! grow with the mesh. Files are written in a folder beside the output, synced, and renamed when they are
-//! complete. Coordinates are never rounded.
+//! A store becomes one conforming mesh. Vertices and tetrahedra are numbered densely in (sub-domain, local) order, and vertices that several
+//! sub-domains share once. Every input triangle that bounds a filled region is a boundary face, in the order of the input. Alternatively each
+//! sub-domain becomes a mesh of its own, numbered as in the store, whose boundary includes the faces shared with others. All is streamed: memory
+//! does not grow with the mesh. Files are written in a folder beside the output, synced, and renamed when they are complete. Coordinates are
+//! never rounded.
 //!
 //! Reading order: [`export_with`], `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh), `numbering` (shared vertices),
 //! `faces` (the boundary), `output_files`, `stream` and `columns` (files), then one file or folder for each format.

@@ -1,8 +1,8 @@
 //! Columns as Apache Parquet: for each sub-domain a file of tetrahedra and one of vertices.
 //!
-//! `NAME_00007.parquet` has a row for each tetrahedron, `NAME_00007_vertices.parquet` one for each vertex; `NAME.parquet` is not
-//! written. Rows are in the order of the store, which is that of a Hilbert curve, and each group of rows has the least and greatest value
-//! of each column: a program that asks for a place reads the groups that are there.
+//! `NAME_00007.parquet` has a row for each tetrahedron, `NAME_00007_vertices.parquet` one for each vertex; `NAME.parquet` is not written. Rows are
+//! in the order of the store, along a Hilbert curve. Each group of rows has the least and greatest value of each column, so that programs read
+//! only the groups of a box of space.
 
 use std::fs::OpenOptions;
 use std::io::BufWriter;

@@ -1,5 +1,6 @@
-//! Each sub-domain as a mesh of its own: vertices and tetrahedra as they are numbered in the store, and the faces it shares
-//! with others among its boundary faces, labelled `interface_N` by the sub-domain N behind them.
+//! Each sub-domain as a mesh of its own, with the numbers of the store.
+//!
+//! The faces shared with other sub-domains are boundary faces, labelled `interface_N` by the sub-domain N behind them.
 
 use std::collections::BTreeSet;
 use std::fs;

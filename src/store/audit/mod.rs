@@ -1,18 +1,17 @@
-//! The certificate of a finished store, from what is on disk alone.
+//! The certificate of a finished store, from the files on disk alone.
 //!
-//! # What is proved
-//! Let every tetrahedron have an exactly positive orientation, and let the faces cancel in pairs of
-//! opposite orientation but for those that are input triangles, each with the orientation of its
-//! filled side. Then the sum of the tetrahedra, as a chain, has the filled sides of the input as its
-//! boundary, and the number of tetrahedra over a generic point is the winding number of that boundary
-//! there: one inside, zero outside. So there is no overlap, no gap and no inverted tetrahedron, and
-//! local tests have shown it. It does not matter which of several equal faces cancels which, therefore
-//! faces are first matched inside each chunk, and only the open ones are sorted externally.
+//! # Proof
+//! Let every tetrahedron have an exactly positive orientation. Let the faces cancel in pairs of opposite orientation, except for input triangles,
+//! which have the orientation of their filled side. Then the sum of the tetrahedra, as a chain, has the filled sides of the input as its boundary.
+//! The number of tetrahedra over a generic point is the winding number of that boundary there: one inside, zero outside. So local tests show that
+//! there is no overlap, no gap and no inverted tetrahedron. Equal faces may cancel in any pairing. Therefore faces are first matched inside each
+//! chunk, and only the open ones are sorted externally.
 //!
 //! Sub-domains are verified one by one, by any process; their findings are added up in order.
 //!
-//! Reading order: [`Report`] (what is found), `pass` (once through a sub-domain), `part_report` (what is found there), `pairing` (faces across chunks), `interface` (faces across
-//! sub-domains), `against` and `embedded` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
+//! Reading order: [`Report`] (the findings), `pass` (once through a sub-domain), `part_report` (the findings of a sub-domain), `pairing` (faces
+//! across chunks), `interface` (faces across sub-domains), `against` and `embedded` (the input), `rows` (summaries and the catalog). `damage` lists
+//! everything that cannot be read.
 
 mod against;
 mod compare;

@@ -1,10 +1,9 @@
 //! Location of a single point with as few chunks as possible.
 //!
-//! No vertex of a tetrahedron that holds the point is farther from it than the longest edge of its chunk, and the tetrahedron lies in
-//! the box around its vertices. Of a vertex that has not been read the box of its chunk is known. So a chunk of
-//! tetrahedra is read only when one of the vertices that lead them is near enough, most of it is ruled out at once, and each
-//! chunk of vertices that is read rules out more. What is left decides what is read next: the chunk that completes most,
-//! where the point is central in it.
+//! A tetrahedron that holds the point lies in the box around its vertices. Each of these is at most as far from the point as the longest edge of
+//! the chunk is long. The box of a vertex that is not read yet is that of its chunk. A chunk of tetrahedra is read only when one of its leading
+//! vertices is near enough, and these bounds rule out most of it. Each chunk of vertices that is read rules out more. The next chunk to read is
+//! the one that completes the most tetrahedra, and among equals the one where the point is most central.
 
 use std::collections::BTreeMap;
 

@@ -171,8 +171,8 @@ impl QuerySession {
 
 /// The vertices that lead the tetrahedra of a chunk: the first, and one after the last.
 ///
-/// Tetrahedra are sorted by their least vertex, and vertices along a curve: those of a chunk are led by the vertices from its least
-/// one to the least of the next chunk, which are in chunks of vertices with small boxes.
+/// Tetrahedra are sorted by their least vertex, and vertices along a curve. So the least vertices of a chunk's tetrahedra run from that of its
+/// first one to that of the next chunk, and lie in chunks of vertices with small boxes.
 pub(super) fn leaders(part: &Subdomain, chunk: usize) -> Range<u32> {
     let least = |chunk: usize| part.tet_summaries().get(chunk).map(|s| s.vertices[0]);
     let n_vertices = part.row().vertices as u32;

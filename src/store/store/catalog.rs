@@ -37,10 +37,10 @@ const WORK: &str = "work";
 
 /// The catalog of a store, open for reading or for writing.
 ///
-/// At most one process writes at a time, and has [`WriterLock`] from before its first byte to after its last. Changes happen in
-/// [`Catalog::commit`] only. The catalog of an unfinished store is changed in place, and nobody can read it meanwhile. That of a finished
-/// store never is: a commit writes another file, which takes its name. A reader has the file that had the name when it came, so that it
-/// sees one state of the store however long it reads, and neither waits for the other.
+/// At most one process writes at a time; it holds the [`WriterLock`] from before its first byte to after its last. Only [`Catalog::commit`]
+/// changes the catalog. That of an unfinished store is changed in place, and cannot be read meanwhile. For a finished store, a commit writes a
+/// new file and gives it the catalog's name. A reader keeps the file that it opened, so it sees one state of the store, and readers and writer
+/// never wait for each other.
 pub struct Catalog {
     dir: DiskPath,
     file: StoreFile,
