@@ -44,7 +44,7 @@ impl Number {
 }
 
 /// The entry of a row in a column: one number, or several of one type.
-pub(super) trait CellValue {
+pub(super) trait ColumnValue {
     const NUMBER: Number;
     const COMPONENTS: u64;
     /// Writes the numbers, little end first.
@@ -53,7 +53,7 @@ pub(super) trait CellValue {
 
 macro_rules! cells {
     ($($type:ty => $number:ident),*) => {$(
-        impl CellValue for $type {
+        impl ColumnValue for $type {
             const NUMBER: Number = Number::$number;
             const COMPONENTS: u64 = 1;
 
@@ -67,7 +67,7 @@ macro_rules! cells {
 
 cells!(u8 => U8, i32 => I32, u32 => U32, i64 => I64, f64 => F64);
 
-impl<T: CellValue, const N: usize> CellValue for [T; N] {
+impl<T: ColumnValue, const N: usize> ColumnValue for [T; N] {
     const NUMBER: Number = T::NUMBER;
     const COMPONENTS: u64 = N as u64;
 
@@ -89,7 +89,7 @@ pub(super) struct TableColumn<T> {
 type Put<T> = dyn Fn(&T, &mut Strip) -> Result<()>;
 
 /// The column `name` with the `value` of each row.
-pub(super) fn column<T, V: CellValue>(
+pub(super) fn column<T, V: ColumnValue>(
     name: &'static str,
     value: impl Fn(&T) -> V + 'static,
 ) -> TableColumn<T> {

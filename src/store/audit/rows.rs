@@ -12,13 +12,13 @@ use tetdb_schema::digest::Digest;
 use tetdb_schema::record::SealedTet;
 
 use super::{Finding, Report};
-use crate::sealed::{Corner, RegionTotals, Subdomain, Totals};
+use crate::sealed::{Corner, RegionTotals, Subdomain, SubdomainTotals};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
 
 /// Recomputed values of one sub-domain.
 pub(super) struct Rederived {
-    totals: Totals,
+    totals: SubdomainTotals,
     rank: u32,
 }
 
@@ -27,7 +27,7 @@ pub(super) type RegionSums = BTreeMap<u32, RegionTotals>;
 
 impl Rederived {
     pub(super) fn new(rank: u32) -> Self {
-        let totals = Totals::default();
+        let totals = SubdomainTotals::default();
         Self { totals, rank }
     }
 

@@ -17,7 +17,7 @@ const FEW: usize = 16;
 
 /// A point and the tetrahedron that holds it; of several tetrahedra with the point on a face, the one with the least id.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Located {
+pub struct LocatedPoint {
     /// The point.
     pub point: Point,
     /// `None` outside the mesh.
@@ -84,14 +84,14 @@ impl QuerySession {
     ///
     /// Points are located in the order of the Hilbert curve, so that they share chunks.
     /// Memory: some 300 bytes a point. Errors: damage.
-    pub fn locate(&mut self, points: &[Point]) -> Result<Vec<Located>, QueryError> {
+    pub fn locate(&mut self, points: &[Point]) -> Result<Vec<LocatedPoint>, QueryError> {
         let curve = HilbertFrame::new(&self.bounds());
         let mut order: Vec<(u64, usize)> =
             points.iter().enumerate().map(|(i, &p)| (curve.index(p), i)).collect();
         order.sort_unstable();
-        let mut answers: Vec<Located> = points
+        let mut answers: Vec<LocatedPoint> = points
             .iter()
-            .map(|&point| Located { point, found: None, barycentric: [0.0; 4] })
+            .map(|&point| LocatedPoint { point, found: None, barycentric: [0.0; 4] })
             .collect();
         let mut candidates = Vec::new();
         for (_, i) in order {

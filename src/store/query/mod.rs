@@ -29,7 +29,7 @@ mod tree;
 
 pub use error::QueryError;
 pub use hit::{Hit, VARIABLES};
-pub use locate::Located;
+pub use locate::LocatedPoint;
 pub use order::Ordered;
 pub use select::Selected;
 pub use selection::{Selection, Sharing};

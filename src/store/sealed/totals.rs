@@ -16,7 +16,7 @@ use tetdb_schema::catalog::QualityRow;
 const PIECE: usize = 4096;
 
 /// Sums over tetrahedra, in their order.
-pub struct Totals {
+pub struct SubdomainTotals {
     /// Digest of the tetrahedra.
     pub digest: Digest,
     /// Bounds of the vertices, set by the caller.
@@ -109,7 +109,7 @@ pub(super) fn count_open(pairs: &mut FacePairs, tets: &[SealedTet]) -> u32 {
 }
 
 /// Sums of no tetrahedra.
-impl Default for Totals {
+impl Default for SubdomainTotals {
     fn default() -> Self {
         Self {
             digest: Digest::default(),
@@ -126,7 +126,7 @@ impl Default for Totals {
     }
 }
 
-impl Totals {
+impl SubdomainTotals {
     /// Adds a chunk and returns its summary without the number of open faces and the bytes.
     ///
     /// Errors: those of `corners_of`.

@@ -13,7 +13,7 @@ use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
 use super::SealedError;
 use super::batch::Batch;
 use super::form::{Cut, Cutter};
-use super::totals::{RegionTotals, Totals, array, count_open};
+use super::totals::{RegionTotals, SubdomainTotals, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{DiskPath, StoreFile, join};
@@ -71,7 +71,7 @@ pub struct SealedWriter {
     faces: Cutter<InterfaceFace>,
     face_chunks: Vec<RangeSummary<true>>,
     pairs: FacePairs,
-    totals: Totals,
+    totals: SubdomainTotals,
     interfaces: BTreeMap<(u32, u32), (u64, Digest)>,
 }
 
@@ -120,7 +120,7 @@ impl SealedWriter {
             faces: Cutter::new(form, rank, generation).map_err(io)?,
             face_chunks: Vec::new(),
             pairs: FacePairs::new(SealedTet::COUNT_MAX),
-            totals: Totals::default(),
+            totals: SubdomainTotals::default(),
             interfaces: BTreeMap::new(),
         })
     }
