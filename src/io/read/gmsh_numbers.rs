@@ -6,7 +6,7 @@ use std::io::BufRead;
 use super::Result;
 use super::feed::Feed;
 
-/// GmshNumbers of a section, in text or in binary of either byte order.
+/// Numbers of a section, in text or in binary of either byte order.
 pub(super) struct GmshNumbers<R> {
     pub feed: Feed<R>,
     pub binary: bool,

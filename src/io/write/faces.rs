@@ -132,7 +132,7 @@ impl FaceSorter {
     }
 }
 
-/// MergedFaces being written to their scratch file.
+/// Faces being written to their scratch file.
 struct FaceFile {
     faces: MergedFaces,
     stream: Stream,

@@ -9,7 +9,7 @@
 //!
 //! Sub-domains are verified one by one, by any process; their findings are added up in order.
 //!
-//! Reading order: [`Report`] (the findings), `pass` (once through a sub-domain), `part_report` (the findings of a sub-domain), `pairing` (faces
+//! Reading order: [`Report`] (the findings), `pass` (once through a sub-domain), `mesh_sums` (sums over all), `part_report` (the findings of a sub-domain), `pairing` (faces
 //! across chunks), `interface` (faces across sub-domains), `against` and `embedded` (the input), `rows` (summaries and the catalog). `damage` lists
 //! everything that cannot be read.
 
@@ -18,6 +18,7 @@ mod compare;
 mod damage;
 mod embedded;
 mod interface;
+mod mesh_sums;
 mod options;
 mod pairing;
 mod part_report;

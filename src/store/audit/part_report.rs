@@ -19,7 +19,7 @@ pub struct PartReport {
     pub(super) embedded: Option<FoundEmbedded>,
 }
 
-/// MeshVolumes of a sub-domain, or the sums of those of several.
+/// Volumes of a sub-domain, or the sums of those of several.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug, Default)]
 pub(super) struct MeshVolumes {
     pub of_tets: f64,

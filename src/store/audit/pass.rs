@@ -11,8 +11,8 @@ use super::against::{Input, check_owners};
 use super::embedded::EmbeddedSearch;
 use super::interface::InterfaceAudit;
 use super::pairing::{OpenSide, OpenSides};
-use super::part_report::{MeshVolumes, PartReport};
-use super::rows::{Rederived, RegionSums, check_regions};
+use super::part_report::MeshVolumes;
+use super::rows::{Rederived, RegionSums};
 use super::{Finding, Level, Report, VerifyOptions};
 use crate::sealed::{
     BitSet, Corner, FaceJoin, FaceJoinSorter, FacePairs, Paired, Subdomain, sorted_face,
@@ -20,31 +20,26 @@ use crate::sealed::{
 use crate::store::StoreError;
 use tetdb_base::geom::{Point, insphere, orient};
 use tetdb_base::storage::{check_cancelled, parallel};
-use tetdb_schema::catalog::{InterfaceRow, RegionRow};
 
 /// Marks of faces: the reasons for which a face is required.
 const FACET: u8 = 1;
 /// See [`FACET`].
 const INTERFACE: u8 = 2;
 
-/// MeshVolumes that agree this well, relative to the sum of what was added, are the same: sums of
-/// millions of terms lose some six of sixteen digits at most.
-const VOLUME_TOLERANCE: f64 = 1e-9;
-
 /// A verification under way.
 pub(super) struct Audit<'a> {
-    options: &'a VerifyOptions,
-    scratch: &'a Path,
-    input: Option<Input<'a>>,
-    embedded: Option<EmbeddedSearch<'a>>,
-    interfaces: InterfaceAudit,
-    pairs: FacePairs,
-    report: Report,
-    digests: [Digest; 2],
-    regions: RegionSums,
-    volumes: MeshVolumes,
+    pub(super) options: &'a VerifyOptions,
+    pub(super) scratch: &'a Path,
+    pub(super) input: Option<Input<'a>>,
+    pub(super) embedded: Option<EmbeddedSearch<'a>>,
+    pub(super) interfaces: InterfaceAudit,
+    pub(super) pairs: FacePairs,
+    pub(super) report: Report,
+    pub(super) digests: [Digest; 2],
+    pub(super) regions: RegionSums,
+    pub(super) volumes: MeshVolumes,
     /// First corner of the boundary, from which cones to the facets are measured: a distant apex would cancel digits.
-    apex: Option<Point>,
+    pub(super) apex: Option<Point>,
 }
 
 /// The two sides of a face in a chunk.
@@ -78,7 +73,7 @@ impl<'a> Audit<'a> {
         }
     }
 
-    fn level(&self, level: Level) -> bool {
+    pub(super) fn level(&self, level: Level) -> bool {
         self.options.level >= level
     }
 
@@ -449,76 +444,6 @@ impl<'a> Audit<'a> {
             }
         }
         Ok(())
-    }
-
-    /// Returns the findings, for [`add`](Self::add) in another process. Errors: the disk.
-    pub(super) fn into_part(mut self) -> Result<PartReport, StoreError> {
-        Ok(PartReport {
-            digests: self.digests.map(|digest| digest.lanes),
-            regions: (self.regions.iter())
-                .map(|(&region, sum)| (region, sum.tets, sum.volume))
-                .collect(),
-            volumes: self.volumes,
-            interfaces: self.interfaces.into_sides()?,
-            triangles: self.input.take().map(Input::into_found),
-            embedded: self.embedded.take().map(EmbeddedSearch::into_found),
-            report: self.report,
-        })
-    }
-
-    /// Adds the findings of the next sub-domain. Errors: the disk.
-    pub(super) fn add(&mut self, part: PartReport) -> Result<(), StoreError> {
-        self.report.add(part.report);
-        for (sum, lanes) in self.digests.iter_mut().zip(part.digests) {
-            sum.merge(&Digest { lanes });
-        }
-        for (region, tets, volume) in part.regions {
-            let sum = self.regions.entry(region).or_default();
-            sum.tets += tets;
-            sum.volume += volume;
-        }
-        self.volumes = self.volumes.and(&part.volumes);
-        self.interfaces.add(part.interfaces)?;
-        if let (Some(input), Some(seen)) = (&mut self.input, part.triangles) {
-            input.add(seen);
-        }
-        if let (Some(embedded), Some(seen)) = (&mut self.embedded, part.embedded) {
-            embedded.add(&seen);
-        }
-        Ok(())
-    }
-
-    pub(super) fn finish(
-        mut self,
-        interfaces: &[InterfaceRow],
-        regions: &[RegionRow],
-    ) -> Result<Report, StoreError> {
-        if self.level(Level::Topology) {
-            self.interfaces.finish(interfaces, &mut self.report)?;
-        }
-        check_regions(regions, &self.regions, &mut self.report);
-        self.report.volume = self.volumes.of_tets;
-        self.report.volume_within_boundary = self.volumes.within_boundary;
-        if self.options.level >= Level::Geometry {
-            let (found, expected) = (self.report.volume, self.report.volume_within_boundary);
-            let tolerance =
-                VOLUME_TOLERANCE * self.volumes.scale.max(found) + self.volumes.rounding;
-            if (found - expected).abs() > tolerance {
-                let what = format_args!(
-                    "the tetrahedra have volume {found}, their boundary encloses {expected}"
-                );
-                self.report.find(Finding::VolumeDiffers, None, what);
-            }
-            if let Some(input) = self.input.take() {
-                input.finish(&mut self.report);
-            }
-            if let Some(embedded) = self.embedded.take() {
-                embedded.finish(&mut self.report);
-            }
-        }
-        self.report.digest = self.digests[0].to_string();
-        self.report.interface_digest = self.digests[1].to_string();
-        Ok(self.report)
     }
 }
 
