@@ -74,7 +74,7 @@ pub enum ReadFault {
         /// The content found.
         found: String,
     },
-    /// Something else stands where the format asks for a word, a number or an end.
+    /// The file has other content where the format requires a word, a number or an end.
     #[error("expected {expected}, found {found}")]
     Unexpected {
         /// The expected content.

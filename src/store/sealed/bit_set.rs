@@ -43,3 +43,22 @@ impl BitSet {
         &mut self.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_new_once() {
+        let mut set = BitSet::new(130);
+        let members = [0u32, 63, 64, 129];
+        for number in members {
+            assert!(!set.contains(number.into()));
+            assert!(set.insert(number.into()) && !set.insert(number.into()));
+        }
+        set.insert_all([5, 64]);
+        let found: Vec<u64> = (0..130).filter(|&number| set.contains(number)).collect();
+        assert_eq!(found, [0, 5, 63, 64, 129]);
+        assert_eq!(set.words().iter().map(|word| word.count_ones()).sum::<u32>(), 5);
+    }
+}

@@ -76,3 +76,39 @@ impl FaceJoin {
         Ok(found)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faces_meet_their_tetrahedra_in_order() -> Result<(), Box<dyn std::error::Error>> {
+        let dir = tempfile::tempdir()?;
+        let nodes = [4, 2, 9, 7];
+        let mut sorter = FaceJoinSorter::new(dir.path(), 0);
+        for (i, face) in FACES.iter().enumerate().filter(|(i, _)| *i != 2) {
+            sorter.push(5, face.map(|k| nodes[k]), false, i as u32)?;
+        }
+        // Seen from inside the tetrahedron, and the same face of another one.
+        let [a, b, c] = FACES[2].map(|k| nodes[k]);
+        sorter.push(5, [a, c, b], true, 2)?;
+        sorter.push(3, [a, b, c], true, 0)?;
+        let mut join = sorter.finish()?;
+        assert_eq!(join.next_below(4)?.map(|face| (face.tet, face.place(nodes))), Some((3, None)));
+        assert_eq!(join.next_below(5)?, None);
+        let mut places = Vec::new();
+        while let Some(face) = join.next_below(6)? {
+            places.push((face.mark as usize, face.place(nodes)));
+        }
+        places.sort_unstable();
+        assert_eq!(places, [0, 1, 2, 3].map(|i| (i, Some(i))));
+
+        let mut sorter = FaceJoinSorter::new(dir.path(), 0);
+        sorter.push(2, [1, 2, 3], false, 0)?;
+        sorter.push(5, [a, b, c], true, 0)?;
+        let mut join = sorter.finish()?;
+        assert_eq!(join.faces_of(5, nodes)?, [false, false, true, false]);
+        assert_eq!(join.faces_of(6, nodes)?, [false; 4]);
+        Ok(())
+    }
+}

@@ -1,7 +1,7 @@
 //! Defective triangles of a surface as a VTK file, for viewers.
 //!
 //! Each triangle has vertices of its own. Cell data: `defect`, the number of the first kind in [`KINDS`] it has;
-//! `defects`, in how many it takes part; `input_id`; `label`. The words of the numbers stand in the field array
+//! `defects`, the number of its defects; `input_id`; `label`. The words of the numbers are in the field array
 //! `defect_names`: bytes of UTF-8, a zero after each word.
 
 use std::collections::BTreeMap;
