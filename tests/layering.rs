@@ -41,7 +41,6 @@ const LONG_FILES: &[(&str, &str)] = &[
     ("engine/api/mesher.rs", "a method with its documentation for each option of a mesh"),
     ("engine/api/surface.rs", "a method with its documentation for all that is done to a surface"),
     ("store/store/catalog.rs", "one transaction type: a reader and a writer for each table"),
-    ("io/read/feed.rs", "the words, numbers and places that every text format reads by"),
 ];
 
 /// Functions above [`FUNCTION_LINES_MAX`].
