@@ -41,7 +41,6 @@ const LONG_FILES: &[(&str, &str)] = &[
     ("engine/api/mesher.rs", "a method with its documentation for each option of a mesh"),
     ("engine/api/surface.rs", "a method with its documentation for all that is done to a surface"),
     ("store/store/catalog.rs", "one transaction type: a reader and a writer for each table"),
-    ("store/audit/pass.rs", "one walk over a sub-domain that all five levels of checks share"),
 ];
 
 /// Functions above [`FUNCTION_LINES_MAX`].
@@ -59,25 +58,6 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "pairs of sides are matched; each step uses the list before",
     ),
     ("cli/estimate.rs run", "an answer line by line, for people and for programs"),
-    (
-        "io/write/foam/faces.rs part",
-        "one merge of four sorted streams; what a face is depends on all four",
-    ),
-    ("io/write/foam/processors.rs faces", "three kinds of faces in the order of one file"),
-    ("io/write/foam/processors.rs write", "two passes that share their counts"),
-    (
-        "io/write/gmsh/nodes.rs claims",
-        "faces, tetrahedra, vertices and ghosts claim in turn, into one sorter",
-    ),
-    ("io/write/midpoints.rs gather", "five passes, each sorted for the next"),
-    (
-        "io/write/vtu.rs write_partitions",
-        "nine arrays named, opened, filled and closed in one order",
-    ),
-    (
-        "io/write/vtu_boundary.rs write",
-        "fourteen arrays named, opened, filled and closed in one order",
-    ),
     ("engine/pipeline/mesh/run.rs coarse_step", "one step of the recipe and its commit"),
     ("engine/pipeline/remesh/run.rs commit", "one commit: what it checks and all that it writes"),
     (

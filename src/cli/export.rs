@@ -13,7 +13,9 @@ use super::query;
 use super::query_ask::regions;
 use tetdb_engine::api::targets::{check_target, inputs_of};
 use tetdb_engine::api::{Error, Exported, Settings, show};
-use tetdb_io::write::{Content, ENDINGS, MeshFormat, Order, Selection, Share, Writers, check};
+use tetdb_io::write::{
+    Content, ENDINGS, ElementOrder, ExportSelection, MeshFormat, Share, Writers, check,
+};
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     let is_first = share_of_ranks().is_none_or(|share| share.number == 1);
@@ -68,7 +70,7 @@ fn write_share(
 ) -> Result<Vec<Exported>, Failure> {
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let format = match &args.format {
-        Some(word) => Some(MeshFormat::of_word(word).ok_or_else(|| {
+        Some(word) => Some(MeshFormat::from_word(word).ok_or_else(|| {
             Failure::new(Code::UnknownFormat, "no format has this name")
                 .at(word)
                 .help(format!("choose msh22, or an ending without its dot: {ENDINGS}"))
@@ -79,7 +81,7 @@ fn write_share(
         Some(text) => regions(text, &show::region_names(&args.store)?)?,
         None => Vec::new(),
     };
-    let mut selection = Selection {
+    let mut selection = ExportSelection {
         subdomains: args.subdomain.iter().copied().collect(),
         regions: regions.into_iter().collect(),
         pieces: args.pieces,
@@ -94,8 +96,8 @@ fn write_share(
         ghosts: args.ghosts,
         split_sheets: args.split_sheets,
         order: match args.order {
-            2 => Order::Second,
-            _ => Order::First,
+            2 => ElementOrder::Second,
+            _ => ElementOrder::First,
         },
     };
     let mut outs = Vec::new();
@@ -175,7 +177,7 @@ fn rows(args: &ExportArgs) -> Result<Option<QueryArgs>, Failure> {
 
 /// Refuses names whose format cannot be told, before any work.
 pub fn check_format(out: &Path) -> Result<(), Failure> {
-    match MeshFormat::of_extension(out) {
+    match MeshFormat::from_extension(out) {
         Some(_) => Ok(()),
         None => Err(Failure::new(
             Code::UnknownFormat,
@@ -190,7 +192,7 @@ pub fn check_format(out: &Path) -> Result<(), Failure> {
 pub fn write(
     path: &Path,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
     settings: &Settings,
     console: &Console,
 ) -> Result<Exported, Failure> {
@@ -200,7 +202,7 @@ pub fn write(
 /// The same, as one of several processes that write the file together.
 fn write_with(
     (path, out): (&Path, &Path),
-    selection: &Selection,
+    selection: &ExportSelection,
     settings: &Settings,
     console: &Console,
     writers: Option<&dyn Writers>,

@@ -9,7 +9,7 @@ use tetdb_schema::ids::VertexId;
 use super::console::Console;
 use super::failure::Failure;
 use tetdb_io::write::{NpyField, NpyTable, SelectedTet, SelectedVtu, TextFile};
-use tetdb_store::query::{Hit, Located, VARIABLES};
+use tetdb_store::query::{Hit, LocatedPoint, VARIABLES};
 
 /// A column of the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,7 +81,7 @@ impl QueryColumn {
 /// An answer: a tetrahedron, or a point and perhaps its tetrahedron.
 pub struct Row {
     pub found: Option<Hit>,
-    pub located: Option<Located>,
+    pub located: Option<LocatedPoint>,
 }
 
 /// A value of a row.

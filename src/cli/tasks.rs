@@ -14,7 +14,7 @@ use super::{memory, threads};
 use tetdb_engine::api::tasks::ranges;
 use tetdb_engine::api::{Error, Tasks};
 use tetdb_engine::pipeline::{Planned, TaskState};
-use tetdb_io::write::{Selection, check};
+use tetdb_io::write::{ExportSelection, check};
 
 /// Sub-domains a task of the last stage should have, so that tasks end at about the same time.
 const SUBDOMAINS_PER_TASK: u32 = 4;
@@ -24,7 +24,7 @@ const MEMORY_PER_TASK: u64 = 4 << 30;
 pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
     let memory_bytes = memory::asked(args.memory_per_task.as_deref())?.unwrap_or(MEMORY_PER_TASK);
     if let Some(out) = &args.export {
-        let pieces = Selection { pieces: true, ..Selection::default() };
+        let pieces = ExportSelection { pieces: true, ..ExportSelection::default() };
         check(out, &pieces).map_err(Error::from)?;
     }
     let tasks = Tasks::of(&args.store).settings(console.settings(None, None));

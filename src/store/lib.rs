@@ -7,7 +7,7 @@
 //! | [`query`] | locate, select, order |
 //! | [`audit`] | verification, digest, comparison |
 //!
-//! This crate does no meshing. Programs use the crate `tetdb`; no promise is made of what is public here.
+//! This crate does no meshing. Programs use the crate `tetdb`; the items that are public here may change at any time.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 

@@ -1,4 +1,4 @@
-//! Every kind of question against a look at all tetrahedra: on a grid, where everything touches, and on a real mesh.
+//! Every kind of question against a test of all tetrahedra: on a grid, where everything touches, and on a real mesh.
 
 mod grid;
 mod near;
@@ -47,8 +47,8 @@ impl Fixture {
             for (id, tet) in tets {
                 let corners = part.corners(tet.nodes)?;
                 let (ids, points) = (corners.map(|c| c.id), corners.map(|c| c.point));
-                let beside = facets.iter().filter(|f| f.tets.contains(&id.local()));
-                let faces: Vec<[u32; 3]> = beside.map(|facet| facet.vertices).collect();
+                let own = facets.iter().filter(|f| f.tets.contains(&id.local()));
+                let faces: Vec<[u32; 3]> = own.map(|facet| facet.vertices).collect();
                 // A face is opposite the vertex it lacks.
                 let on_surface = tet.nodes.map(|v| faces.iter().any(|face| !face.contains(&v)));
                 all.push(Hit {
@@ -62,9 +62,9 @@ impl Fixture {
 }
 
 fn grid(cells: usize, parts: usize) -> Outcome<Fixture> {
-    let made = Fixture { dir: tempfile::tempdir()? };
-    Grid { cells, parts }.write(&made.path())?;
-    Ok(made)
+    let fixture = Fixture { dir: tempfile::tempdir()? };
+    Grid { cells, parts }.write(&fixture.path())?;
+    Ok(fixture)
 }
 
 /// A mesh of two sub-domains with several chunks.
@@ -74,20 +74,20 @@ fn real() -> Outcome<Fixture> {
 
 /// A sample in two sub-domains.
 fn real_of(sample: &str) -> Outcome<Fixture> {
-    let made = Fixture { dir: tempfile::tempdir()? };
+    let fixture = Fixture { dir: tempfile::tempdir()? };
     let surface = tetdb_kernel::samples::SampleSpec::parse(sample)?.make()?;
     let subdomains = Subdomains::Exactly(2);
     let options = MeshOptions { subdomains, ..MeshOptions::default() };
     let job = Job { options: serde_json::to_string(&options)?, ..Job::default() };
     let options = options.into();
-    let mut catalog = Catalog::create(made.path(), &job)?;
+    let mut catalog = Catalog::create(fixture.path(), &job)?;
     let budget = Budget::new(512 << 20);
     tetdb_engine::pipeline::mesh(&mut catalog, &surface.into(), &options, &budget, &|_| {})?;
     catalog.close()?;
-    Ok(made)
+    Ok(fixture)
 }
 
-/// Numbers that look random, the same for the same seed.
+/// A reproducible sequence of random numbers.
 struct Random(u64);
 
 impl Random {
@@ -129,7 +129,7 @@ fn ids(found: impl IntoIterator<Item = Result<Hit, QueryError>>) -> Outcome<Vec<
     Ok(ids)
 }
 
-/// Asks, and compares with a look at all.
+/// Compares the answers with a test of all tetrahedra; returns their number.
 fn expect(
     session: &mut QuerySession,
     all: &[Hit],

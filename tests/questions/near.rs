@@ -5,9 +5,9 @@ use super::*;
 #[test]
 fn surface_and_interfaces_select_what_stands_on_them() -> Outcome {
     let (cells, parts) = (6, 3);
-    let made = grid(cells, parts)?;
-    let all = made.all()?;
-    let mut session = made.session(64 << 20)?;
+    let fixture = grid(cells, parts)?;
+    let all = fixture.all()?;
+    let mut session = fixture.session(64 << 20)?;
     let faces =
         |t: &Hit, on: &dyn Fn(&Point) -> bool| t.corners.iter().filter(|c| on(c)).count() == 3;
     let end = cells as f64;
@@ -39,9 +39,9 @@ fn surface_and_interfaces_select_what_stands_on_them() -> Outcome {
 #[test]
 fn balls_shells_and_neighbors_cross_interfaces() -> Outcome {
     let mut random = Random::new(4);
-    for made in [grid(4, 2)?, real()?] {
-        let all = made.all()?;
-        let mut session = made.session(64 << 20)?;
+    for fixture in [grid(4, 2)?, real()?] {
+        let all = fixture.all()?;
+        let mut session = fixture.session(64 << 20)?;
         let mut across = 0;
         for _ in 0..40 {
             let tet = all[random.below(all.len())];

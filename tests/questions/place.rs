@@ -12,8 +12,8 @@ fn holder(all: &[(Aabb, Hit)], p: Point) -> Option<TetId> {
 #[test]
 fn points_are_found_in_the_lowest_tetrahedron_that_holds_them() -> Outcome {
     let mut random = Random::new(1);
-    for (made, lattice) in [(grid(4, 3)?, 4), (grid(18, 1)?, 18), (real()?, 0)] {
-        let all = made.all()?;
+    for (fixture, lattice) in [(grid(4, 3)?, 4), (grid(18, 1)?, 18), (real()?, 0)] {
+        let all = fixture.all()?;
         let mut points = Vec::new();
         for _ in 0..150 {
             let tet = all[random.below(all.len())];
@@ -25,7 +25,7 @@ fn points_are_found_in_the_lowest_tetrahedron_that_holds_them() -> Outcome {
             points.push(random.point(&Aabb::around(all[0].corners.into_iter().chain(tet.corners))));
         }
         let all: Vec<_> = all.into_iter().map(|t| (Aabb::around(t.corners), t)).collect();
-        let mut session = made.session(64 << 20)?;
+        let mut session = fixture.session(64 << 20)?;
         let located = session.locate(&points)?;
         for (located, &p) in located.iter().zip(&points) {
             assert_eq!(located.point, p);
@@ -37,7 +37,7 @@ fn points_are_found_in_the_lowest_tetrahedron_that_holds_them() -> Outcome {
         }
         // One by one, from nothing: the other way to look.
         for batch in points.chunks(7).step_by(25) {
-            let alone = made.session(64 << 20)?.locate(batch)?;
+            let alone = fixture.session(64 << 20)?.locate(batch)?;
             let together = &located[points.iter().position(|p| p == &batch[0]).unwrap_or(0)..];
             assert_eq!(alone[0], together[0]);
             for answer in alone {
@@ -75,9 +75,9 @@ fn solids(random: &mut Random, lattice: Option<usize>, bounds: &Aabb) -> Vec<Sol
 #[test]
 fn solids_select_what_meets_them_and_what_lies_in_them() -> Outcome {
     let mut random = Random::new(2);
-    for (made, lattice) in [(grid(4, 2)?, Some(4)), (real()?, None)] {
-        let all = made.all()?;
-        let mut session = made.session(64 << 20)?;
+    for (fixture, lattice) in [(grid(4, 2)?, Some(4)), (real()?, None)] {
+        let all = fixture.all()?;
+        let mut session = fixture.session(64 << 20)?;
         let bounds = session.bounds();
         let mut touching = 0;
         for solid in solids(&mut random, lattice, &bounds) {

@@ -12,8 +12,8 @@ fn area(piece: &Piece) -> f64 {
 
 #[test]
 fn sections_cover_what_the_plane_cuts_once() -> Outcome {
-    let made = grid(4, 2)?;
-    let mut session = made.session(64 << 20)?;
+    let fixture = grid(4, 2)?;
+    let mut session = fixture.session(64 << 20)?;
     let diagonal = 16.0 * 2f64.sqrt();
     for (origin, normal, expected) in [
         // Between and through vertices, from both sides, along a diagonal, through a corner.
@@ -25,7 +25,14 @@ fn sections_cover_what_the_plane_cuts_once() -> Outcome {
     ] {
         let view = View::new(origin, normal);
         let section = |session: &mut QuerySession, crinkle| {
-            view::section(session, &view, crinkle, Selection::default(), made.dir.path(), 1 << 16)
+            view::section(
+                session,
+                &view,
+                crinkle,
+                Selection::default(),
+                fixture.dir.path(),
+                1 << 16,
+            )
         };
         let cut = section(&mut session, false)?;
         let extent = cut.extent;

@@ -10,9 +10,9 @@ fn bare(hits: &[Hit]) -> Vec<Hit> {
 
 #[test]
 fn numbers_and_conditions_select_what_they_say() -> Outcome {
-    for made in [grid(6, 3)?, real()?] {
-        let all = made.all()?;
-        let mut session = made.session(64 << 20)?;
+    for fixture in [grid(6, 3)?, real()?] {
+        let all = fixture.all()?;
+        let mut session = fixture.session(64 << 20)?;
         let none = Selection::default;
         expect(&mut session, &all, none(), |_| true)?;
         let selection = Selection { subdomains: Some(vec![1]), ..none() };
@@ -42,11 +42,11 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
 
 #[test]
 fn answers_are_sorted_by_any_variable() -> Outcome {
-    let made = grid(6, 2)?;
-    let mut all = made.all()?;
-    let mut session = made.session(64 << 20)?;
+    let fixture = grid(6, 2)?;
+    let mut all = fixture.all()?;
+    let mut session = fixture.session(64 << 20)?;
     for (variable, descending) in [(4, false), (4, true), (0, true), (3, false)] {
-        let dir = made.dir.path();
+        let dir = fixture.dir.path();
         // Little memory: runs go to the disk.
         let ordered = Ordered::new(
             session.select(Selection::default())?,
@@ -69,8 +69,8 @@ fn answers_are_sorted_by_any_variable() -> Outcome {
 
 #[test]
 fn the_worst_and_the_best_are_found_without_a_look_at_all() -> Outcome {
-    for made in [grid(6, 2)?, real()?] {
-        let all = made.all()?;
+    for fixture in [grid(6, 2)?, real()?] {
+        let all = fixture.all()?;
         for (text, greatest, limit) in [
             ("true", true, 7),
             ("true", false, 1),
@@ -89,7 +89,7 @@ fn the_worst_and_the_best_are_found_without_a_look_at_all() -> Outcome {
             expected.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.id.cmp(&b.id)));
             expected.truncate(limit);
             let selection = Selection { condition: Some(condition), ..Selection::default() };
-            let mut session = made.session(64 << 20)?;
+            let mut session = fixture.session(64 << 20)?;
             let found = session.extreme(&selection, greatest, limit)?;
             assert_eq!(bare(&found), bare(&expected), "{text}");
             // A single one is found in the chunk that promises most, but for a promise hardly kept.
@@ -102,9 +102,9 @@ fn the_worst_and_the_best_are_found_without_a_look_at_all() -> Outcome {
 
 #[test]
 fn only_chunks_that_matter_are_read() -> Outcome {
-    let made = real_of("box,h=0.035")?;
-    let all = made.all()?;
-    let mut session = made.session(64 << 20)?;
+    let fixture = real_of("box,h=0.035")?;
+    let all = fixture.all()?;
+    let mut session = fixture.session(64 << 20)?;
     let chunks = session.measures();
     assert!(chunks.tet_chunks >= 4, "{chunks:?}");
     let nowhere = Selection {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
 use super::{Error, Settings, Store, guarded};
-use tetdb_io::write::{self, Content, MeshFormat, Order, Selection, Share, Writers};
+use tetdb_io::write::{self, Content, ElementOrder, ExportSelection, MeshFormat, Share, Writers};
 
 /// A writer holds no more than this, however large the cap.
 const MEMORY_MAX: u64 = 512 << 20;
@@ -14,7 +14,7 @@ const MEMORY_MAX: u64 = 512 << 20;
 /// What of a mesh is written; by default all of it, in one file.
 #[derive(Clone, Debug, Default)]
 pub struct ExportOptions {
-    selection: Selection,
+    selection: ExportSelection,
 }
 
 /// What was written.
@@ -87,7 +87,7 @@ impl ExportOptions {
 
     /// Elements with the middles of edges as nodes: tetrahedra of ten, triangles of six; `.vtu`, `.pvtu`, `.vtkhdf`, `.msh` and `.inp`.
     pub fn second_order(mut self) -> Self {
-        self.selection.order = Order::Second;
+        self.selection.order = ElementOrder::Second;
         self
     }
 
@@ -133,7 +133,7 @@ pub fn region_names(store: &Path) -> Result<Vec<String>, Error> {
 pub fn export(
     store: &Path,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
     settings: &Settings,
 ) -> Result<Exported, Error> {
     export_with(store, (out, selection), settings, None)
@@ -143,7 +143,7 @@ pub fn export(
 #[doc(hidden)]
 pub fn export_with(
     store: &Path,
-    (out, selection): (&Path, &Selection),
+    (out, selection): (&Path, &ExportSelection),
     settings: &Settings,
     writers: Option<&dyn Writers>,
 ) -> Result<Exported, Error> {

@@ -88,7 +88,7 @@ impl BinCounts {
     /// `on_surface` says which faces are input triangles.
     fn add(mut self, corners: &[Corner; 4], on_surface: impl FnOnce() -> [bool; 4]) -> Self {
         let points = corners.map(|c| c.point);
-        let quality = Shape::of(points).quality;
+        let quality = Shape::new(points).quality;
         let bin = ((quality - 1.0) * QUALITY_PER_UNIT) as usize;
         self.quality[bin.min(QUALITY_BINS - 1)] += 1;
         self.sum += (quality.min(1e6) * 2f64.powi(32)) as u128;

@@ -34,8 +34,7 @@ fn the_collection_reads_and_validates_as_its_index_says() {
         println!("skipped: TETDB_SURFACES is not set");
         return;
     };
-    let index =
-        std::fs::read_to_string(folder.join("INDEX.tsv")).expect("the folder has an INDEX.tsv");
+    let index = std::fs::read_to_string(folder.join("INDEX.tsv")).expect("an INDEX.tsv");
     let mut wrong = Vec::new();
     println!(
         "{:34} {:>8} {:>8} {:>5} {:>6} {:>8} {:>8} {:>6}  result",
@@ -85,7 +84,7 @@ fn the_collection_reads_and_validates_as_its_index_says() {
             println!("    note: {note}");
         }
         let same = |text: &str, n: i64| text == "-" || text.parse() == Ok(n);
-        // Where a triangle has no area, what is a part is open to opinion.
+        // Triangles without area leave the number of parts open.
         let parts = if class == "invalid" { "-" } else { column[6] };
         if !same(column[4], v as i64)
             || !same(column[5], t as i64)

@@ -1,8 +1,8 @@
-//! Bytes of a file as words, lines or little blocks, with the place always known.
+//! Bytes of a file as words, lines or small blocks, each with its place.
 
 use std::io::{BufRead, Cursor, Read};
 
-use super::error::{FilePlace, ReadError, Spot};
+use super::error::{FilePlace, ReadError, ReadFault, Spot};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{SurfaceBuilder, SurfaceError};
 
@@ -10,26 +10,31 @@ use tetdb_base::surface::{SurfaceBuilder, SurfaceError};
 const WORD_MAX: usize = 4096;
 /// Longest line accepted where lines matter; a polygon of a million corners still fits.
 const LINE_MAX: usize = 16 << 20;
-/// Wanted lengths are kept in single precision, which ends at 3e38; the rest is room for sums and squares.
+/// Wanted lengths are kept in single precision, which ends at 3e38; the rest is left for sums and squares.
 const COORDINATE_MAX: f64 = 1e30;
 
 /// Result of everything that reads.
 pub(super) type Result<T> = std::result::Result<T, ReadError>;
+
+/// A position in a file.
+pub(super) struct Position {
+    file: String,
+    /// Bytes taken so far.
+    pub offset: u64,
+    /// Line of the next byte, from 1; counted by the text functions only.
+    pub line: u64,
+    /// Places are counted in bytes.
+    pub is_binary: bool,
+}
 
 /// A reader over a file's bytes that counts bytes and lines.
 ///
 /// Memory: the reader's buffer, one word and one line. Nothing is allocated from a declared count.
 pub(super) struct Feed<R> {
     reader: R,
-    file: String,
     /// Length of the whole file.
     pub len: u64,
-    /// Bytes taken so far.
-    pub offset: u64,
-    /// Line of the next byte, from 1; counted by the text functions only.
-    pub line: u64,
-    /// Whether places are counted in bytes.
-    pub binary: bool,
+    pub at: Position,
     /// A comment runs from this byte to the end of its line.
     pub comment: Option<u8>,
     word: Vec<u8>,
@@ -39,17 +44,14 @@ impl<R: BufRead> Feed<R> {
     pub fn new(file: &str, reader: R, len: u64) -> Self {
         Self {
             reader,
-            file: file.to_owned(),
             len,
-            offset: 0,
-            line: 1,
-            binary: false,
+            at: Position { file: file.to_owned(), offset: 0, line: 1, is_binary: false },
             comment: None,
             word: Vec::new(),
         }
     }
 
-    /// Looks at up to `N` first bytes without taking them.
+    /// Returns up to `N` first bytes without taking them, and their number.
     pub fn with_head<const N: usize>(mut self) -> Result<([u8; N], usize, Feed<impl BufRead>)> {
         let mut head = [0; N];
         let mut n = 0;
@@ -62,73 +64,81 @@ impl<R: BufRead> Feed<R> {
             }
         }
         let reader = Cursor::new(head).take(n as u64).chain(self.reader);
-        Ok((head, n, Feed::new(&self.file, reader, self.len)))
+        Ok((head, n, Feed::new(&self.at.file, reader, self.len)))
     }
 
     /// First bytes, as many as the reader holds, without taking them.
     pub fn head(&mut self) -> Result<&[u8]> {
-        let place = self.place();
-        self.reader.fill_buf().map_err(|e| broken(place, &e))
+        fill(&mut self.reader, &self.at)
     }
 
     pub fn file(&self) -> &str {
-        &self.file
+        &self.at.file
     }
 
     pub fn place(&self) -> FilePlace {
-        place(&self.file, self.binary, self.offset, self.line)
+        self.at.place()
+    }
+
+    /// The error of a fault here.
+    pub fn refuse(&self, fault: ReadFault) -> ReadError {
+        self.place().refuse(fault)
     }
 
     pub fn truncated(&self, expected: impl Into<String>) -> ReadError {
-        ReadError::Truncated {
-            place: self.place(),
-            expected: expected.into(),
-            found: "the end of the file".to_owned(),
-        }
+        let found = "the end of the file".to_owned();
+        self.refuse(ReadFault::Truncated { expected: expected.into(), found })
     }
 
     pub fn unexpected(&self, expected: impl Into<String>, found: &[u8]) -> ReadError {
-        ReadError::Unexpected {
-            place: self.place(),
-            expected: expected.into(),
-            found: quote(found),
-        }
+        self.refuse(ReadFault::Unexpected { expected: expected.into(), found: quote(found) })
     }
 
     pub fn unsupported(&self, what: impl Into<String>) -> ReadError {
-        ReadError::Unsupported { place: self.place(), what: what.into() }
+        self.refuse(ReadFault::Unsupported(what.into()))
     }
 
     pub fn out_of_range(&self, index: i64, low: i64, high: i64) -> ReadError {
-        ReadError::IndexOutOfRange { place: self.place(), index, low, high }
+        self.refuse(ReadFault::IndexOutOfRange { index, low, high })
+    }
+
+    /// The error of a declared count that cannot be right.
+    pub fn miscounted(
+        &self,
+        what: &'static str,
+        declared: impl ToString,
+        found: impl Into<String>,
+    ) -> ReadError {
+        let (declared, found) = (declared.to_string(), found.into());
+        self.refuse(ReadFault::CountMismatch { what, declared, found })
     }
 
     /// Gives a builder's refusal this place.
     pub fn placed<T>(&self, result: std::result::Result<T, SurfaceError>) -> Result<T> {
-        result.map_err(|source| ReadError::Surface { place: self.place(), source })
+        result.map_err(|source| self.refuse(ReadFault::Surface(source)))
     }
 
     /// Refuses a declared count that the rest of the file cannot hold at `bytes_min` each.
     pub fn check_count(&self, what: &'static str, declared: i64, bytes_min: u64) -> Result<u64> {
-        let left = self.len.saturating_sub(self.offset);
+        let left = self.len.saturating_sub(self.at.offset);
         // The last text record may lack its line end.
         let fits =
             u64::try_from(declared).ok().filter(|&n| n.saturating_mul(bytes_min) <= left + 1);
-        fits.ok_or_else(|| ReadError::CountMismatch {
-            place: self.place(),
-            what,
-            declared: declared.to_string(),
-            found: format!("{left} bytes left in the file"),
+        fits.ok_or_else(|| {
+            self.miscounted(what, declared, format!("{left} bytes left in the file"))
         })
     }
 
     /// The error of a text that ended after `found` of `declared` things.
     pub fn too_few(&self, what: &'static str, declared: u64, found: u64) -> ReadError {
-        ReadError::CountMismatch {
-            place: self.place(),
-            what,
-            declared: declared.to_string(),
-            found: format!("{found} found before the end of the file"),
+        self.miscounted(what, declared, format!("{found} found before the end of the file"))
+    }
+
+    /// Refuses the end of a text before record `found` of `declared`.
+    pub fn need_record(&mut self, what: &'static str, declared: u64, found: u64) -> Result<()> {
+        match !self.at.is_binary && self.at_end()? {
+            true => Err(self.too_few(what, declared, found)),
+            false => Ok(()),
         }
     }
 
@@ -136,26 +146,20 @@ impl<R: BufRead> Feed<R> {
 
     /// The next byte, not taken; `None` at the end.
     pub fn peek(&mut self) -> Result<Option<u8>> {
-        let buffer = self
-            .reader
-            .fill_buf()
-            .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+        let buffer = fill(&mut self.reader, &self.at)?;
         Ok(buffer.first().copied())
     }
 
     fn take(&mut self, n: usize) {
         self.reader.consume(n);
-        self.offset += n as u64;
+        self.at.offset += n as u64;
     }
 
     /// Skips white space and comments, over line ends only when `lines`; true when a word follows.
     fn skip_blank(&mut self, lines: bool) -> Result<bool> {
         let mut in_comment = false;
         loop {
-            let buffer = self
-                .reader
-                .fill_buf()
-                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            let buffer = fill(&mut self.reader, &self.at)?;
             if buffer.is_empty() {
                 return Ok(false);
             }
@@ -168,7 +172,7 @@ impl<R: BufRead> Feed<R> {
                         break;
                     }
                     in_comment = false;
-                    self.line += 1;
+                    self.at.line += 1;
                 } else if !in_comment {
                     if Some(b) == self.comment {
                         in_comment = true;
@@ -204,7 +208,7 @@ impl<R: BufRead> Feed<R> {
         Ok(true)
     }
 
-    /// Whether nothing but white space and comments is left.
+    /// Returns whether only white space and comments are left.
     pub fn at_end(&mut self) -> Result<bool> {
         Ok(!self.skip_blank(true)?)
     }
@@ -217,10 +221,7 @@ impl<R: BufRead> Feed<R> {
     fn take_word(&mut self) -> Result<()> {
         self.word.clear();
         loop {
-            let buffer = self
-                .reader
-                .fill_buf()
-                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            let buffer = fill(&mut self.reader, &self.at)?;
             let comment = self.comment;
             let end = buffer.iter().position(|&b| b.is_ascii_whitespace() || Some(b) == comment);
             let n = end.unwrap_or(buffer.len());
@@ -254,11 +255,7 @@ impl<R: BufRead> Feed<R> {
 
     /// The last word as a number of type `T`.
     pub fn parse<T: std::str::FromStr>(&self, what: &'static str) -> Result<T> {
-        parse(&self.word).ok_or_else(|| ReadError::NotANumber {
-            place: self.place(),
-            what,
-            found: quote(&self.word),
-        })
+        parse(&self.word).ok_or_else(|| not_a_number(&self.place(), what, &self.word))
     }
 
     /// Takes an integer.
@@ -290,23 +287,18 @@ impl<R: BufRead> Feed<R> {
         if x.abs() < COORDINATE_MAX {
             Ok(x)
         } else if x.is_finite() {
-            Err(ReadError::CoordinateRange { place: self.place(), found: x })
+            Err(self.refuse(ReadFault::CoordinateRange(x)))
         } else {
-            let found = if self.binary { x.to_string() } else { quote(&self.word) };
-            Err(ReadError::NotANumber { place: self.place(), what: "a coordinate", found })
+            let found = if self.at.is_binary { x.to_string() } else { quote(&self.word) };
+            Err(self.refuse(ReadFault::NotANumber { what: "a coordinate", found }))
         }
     }
 
     /// A word of a line that began at `place` as a finite coordinate.
     pub fn coordinate_of(&self, word: &[u8], place: &FilePlace) -> Result<f64> {
         let value = parse(word).filter(|x: &f64| x.is_finite());
-        let value = value.ok_or_else(|| ReadError::NotANumber {
-            place: place.clone(),
-            what: "a coordinate",
-            found: quote(word),
-        })?;
-        self.checked(value)
-            .map_err(|_| ReadError::CoordinateRange { place: place.clone(), found: value })
+        let value = value.ok_or_else(|| not_a_number(place, "a coordinate", word))?;
+        self.checked(value).map_err(|_| place.refuse(ReadFault::CoordinateRange(value)))
     }
 
     /// Takes three coordinates.
@@ -331,16 +323,13 @@ impl<R: BufRead> Feed<R> {
     /// Skips to just after the end of this line.
     pub fn skip_line(&mut self) -> Result<()> {
         loop {
-            let buffer = self
-                .reader
-                .fill_buf()
-                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            let buffer = fill(&mut self.reader, &self.at)?;
             if buffer.is_empty() {
                 return Ok(());
             }
             if let Some(i) = buffer.iter().position(|&b| b == b'\n') {
                 self.take(i + 1);
-                self.line += 1;
+                self.at.line += 1;
                 return Ok(());
             }
             let n = buffer.len();
@@ -352,17 +341,14 @@ impl<R: BufRead> Feed<R> {
     pub fn skip_past(&mut self, pattern: &[u8]) -> Result<()> {
         let mut matched = 0;
         loop {
-            let buffer = self
-                .reader
-                .fill_buf()
-                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            let buffer = fill(&mut self.reader, &self.at)?;
             if buffer.is_empty() {
                 return Err(self.truncated(quote(pattern)));
             }
             let mut n = 0;
             while n < buffer.len() && matched < pattern.len() {
                 let b = buffer[n];
-                self.line += u64::from(b == b'\n');
+                self.at.line += u64::from(b == b'\n');
                 matched =
                     if b == pattern[matched] { matched + 1 } else { usize::from(b == pattern[0]) };
                 n += 1;
@@ -378,10 +364,7 @@ impl<R: BufRead> Feed<R> {
     pub fn read_line(&mut self, out: &mut Vec<u8>) -> Result<bool> {
         let start = out.len();
         loop {
-            let buffer = self
-                .reader
-                .fill_buf()
-                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            let buffer = fill(&mut self.reader, &self.at)?;
             if buffer.is_empty() {
                 return Ok(out.len() > start);
             }
@@ -393,18 +376,21 @@ impl<R: BufRead> Feed<R> {
                 return Err(self.unsupported(format!("a line longer than {LINE_MAX} bytes")));
             }
             if end.is_some() {
-                self.line += 1;
+                self.at.line += 1;
                 return Ok(true);
             }
         }
     }
 
-    /// Ends the file of `builder`, which must have got triangles.
+    /// The error of a file without triangles.
+    pub fn empty(&self) -> ReadError {
+        FilePlace { file: self.at.file.clone(), spot: Spot::File }.refuse(ReadFault::Empty)
+    }
+
+    /// Ends the file of `builder`, which must have triangles of it.
     pub fn finish(&self, builder: &mut SurfaceBuilder) -> Result<()> {
         if builder.n_file_triangles() == 0 {
-            return Err(ReadError::Empty {
-                place: FilePlace { file: self.file.clone(), spot: Spot::Totals },
-            });
+            return Err(self.empty());
         }
         self.placed(builder.end_file())
     }
@@ -417,7 +403,7 @@ impl<R: BufRead> Feed<R> {
         let mut block = [0; N];
         match self.reader.read_exact(&mut block) {
             Ok(()) => {
-                self.offset += N as u64;
+                self.at.offset += N as u64;
                 Ok(block)
             }
             Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
@@ -430,10 +416,7 @@ impl<R: BufRead> Feed<R> {
     /// Skips `n` bytes.
     pub fn skip_bytes(&mut self, mut n: u64) -> Result<()> {
         while n > 0 {
-            let buffer = self
-                .reader
-                .fill_buf()
-                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            let buffer = fill(&mut self.reader, &self.at)?;
             let got = buffer.len();
             if got == 0 {
                 return Err(self.truncated(format!("{n} more bytes")));
@@ -446,13 +429,28 @@ impl<R: BufRead> Feed<R> {
     }
 }
 
-fn place(file: &str, binary: bool, offset: u64, line: u64) -> FilePlace {
-    let spot = if binary { Spot::Byte(offset) } else { Spot::Line(line) };
-    FilePlace { file: file.to_owned(), spot }
+impl Position {
+    fn place(&self) -> FilePlace {
+        let spot = match self.is_binary {
+            true => Spot::Byte(self.offset),
+            false => Spot::Line(self.line),
+        };
+        FilePlace { file: self.file.clone(), spot }
+    }
+}
+
+/// The bytes at hand, none at the end of the file.
+fn fill<'b, R: BufRead>(reader: &'b mut R, at: &Position) -> Result<&'b [u8]> {
+    reader.fill_buf().map_err(|e| broken(at.place(), &e))
 }
 
 fn broken(place: FilePlace, error: &std::io::Error) -> ReadError {
-    ReadError::Unreadable { place, reason: error.to_string() }
+    place.refuse(ReadFault::Unreadable(error.to_string()))
+}
+
+/// The error of a word that is no finite number.
+pub(super) fn not_a_number(place: &FilePlace, what: &'static str, found: &[u8]) -> ReadError {
+    place.refuse(ReadFault::NotANumber { what, found: quote(found) })
 }
 
 /// `bytes` as a number in plain decimal text.

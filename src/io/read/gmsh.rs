@@ -7,14 +7,14 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::BufRead;
 
 use super::feed::{Feed, name};
-use super::gmsh_numbers::{NodeTags, Numbers, Role, need_element_type};
-use super::{ReadError, Result, SurfaceSink};
+use super::gmsh_numbers::{GmshNumbers, NodeTags, Role, need_element_type};
+use super::{ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
 
-/// What the sections of one file build up together.
-struct Mesh<'a, 'b, R> {
-    numbers: Numbers<R>,
+/// State of a reader that all sections of a file share.
+struct GmshReader<'a, 'b, R> {
+    numbers: GmshNumbers<R>,
     target: &'a mut SurfaceSink<'b>,
     nodes: NodeTags,
     /// Names of the surface groups.
@@ -26,12 +26,12 @@ struct Mesh<'a, 'b, R> {
     /// The label used last and the group it came from.
     last: Option<(i64, u32)>,
     n_solids: u64,
-    /// The same of volumes.
+    /// Names and groups of volumes, as of surfaces.
     volume_names: HashMap<i64, String>,
     volume_groups: HashMap<i64, i64>,
     /// By name of a volume's group, the first tetrahedron of each volume.
     first_tets: BTreeMap<String, Vec<[u32; 4]>>,
-    /// The volumes that have one.
+    /// The groups and volumes whose first tetrahedron is known.
     seen: HashSet<(i64, i64)>,
 }
 
@@ -57,7 +57,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     feed.skip_line()?;
     let mut big = false;
     if binary {
-        feed.binary = true;
+        feed.at.is_binary = true;
         big = match i32::from_le_bytes(feed.bytes::<4>()?) {
             1 => false,
             0x0100_0000 => true,
@@ -66,8 +66,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     }
     feed.need_keyword("$EndMeshFormat")?;
     feed.skip_line()?;
-    let mut mesh = Mesh {
-        numbers: Numbers { feed, binary, big },
+    let mut mesh = GmshReader {
+        numbers: GmshNumbers { feed, binary, big },
         target,
         nodes: NodeTags::default(),
         names: HashMap::new(),
@@ -90,7 +90,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     mesh.numbers.feed.finish(mesh.target.builder)
 }
 
-impl<R: BufRead> Mesh<'_, '_, R> {
+impl<R: BufRead> GmshReader<'_, '_, R> {
     fn read_sections(&mut self, version: u32) -> Result<()> {
         while self.numbers.feed.next_word()? {
             let section = self.numbers.feed.word().to_vec();
@@ -183,11 +183,7 @@ impl<R: BufRead> Mesh<'_, '_, R> {
         if !self.nodes.push(tag) {
             let found = format!("node {tag} a second time");
             let expected = "nodes of different tags".to_owned();
-            return Err(ReadError::Unexpected {
-                place: self.numbers.feed.place(),
-                expected,
-                found,
-            });
+            return Err(self.numbers.feed.refuse(ReadFault::Unexpected { expected, found }));
         }
         self.numbers.feed.placed(self.target.builder.vertex(p))
     }
@@ -303,7 +299,7 @@ impl<R: BufRead> Mesh<'_, '_, R> {
                 self.numbers.need_record("entities", n, i)?;
                 let entity = self.numbers.int()?;
                 if partitioned {
-                    // Dimension and number of what it is a part of, and the partitions.
+                    // Dimension and number of its parent, and the partitions.
                     let whole = self.numbers.int()?;
                     if (dimension, whole) == (2, 3) {
                         self.inside.insert(entity);
@@ -362,12 +358,8 @@ impl<R: BufRead> Mesh<'_, '_, R> {
         if declared == found {
             return Ok(());
         }
-        Err(ReadError::CountMismatch {
-            place: self.numbers.feed.place(),
-            what,
-            declared: declared.to_string(),
-            found: format!("{found} found in the blocks"),
-        })
+        let found = format!("{found} found in the blocks");
+        Err(self.numbers.feed.miscounted(what, declared, found))
     }
 
     fn read_nodes_4(&mut self) -> Result<()> {

@@ -1,19 +1,19 @@
-//! What Gmsh files of all versions are made of: numbers in text or binary, node tags, element types.
+//! Parts of Gmsh files of all versions: numbers in text or binary, node tags, element types.
 
 use std::collections::HashMap;
 use std::io::BufRead;
 
+use super::Result;
 use super::feed::Feed;
-use super::{ReadError, Result};
 
 /// Numbers of a section, in text or in binary of either byte order.
-pub(super) struct Numbers<R> {
+pub(super) struct GmshNumbers<R> {
     pub feed: Feed<R>,
     pub binary: bool,
     pub big: bool,
 }
 
-impl<R: BufRead> Numbers<R> {
+impl<R: BufRead> GmshNumbers<R> {
     /// An `int` of the format.
     pub fn int(&mut self) -> Result<i64> {
         if !self.binary {
@@ -57,7 +57,7 @@ impl<R: BufRead> Numbers<R> {
         self.feed.check_count(what, declared, bytes_min)
     }
 
-    /// In text, whether a record is left before the section ends.
+    /// Refuses the end of a text section before record `found` of `declared`.
     pub fn need_record(&mut self, what: &'static str, declared: u64, found: u64) -> Result<()> {
         if !self.binary && (self.feed.at_end()? || self.feed.peek()? == Some(b'$')) {
             return Err(self.feed.too_few(what, declared, found));
@@ -124,7 +124,7 @@ impl NodeTags {
     }
 }
 
-/// What an element is to a surface.
+/// The role of an element for a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     /// Flat triangles and quadrilaterals.
@@ -176,16 +176,13 @@ pub(super) fn element_type(kind: i64) -> Option<(usize, Role)> {
     })
 }
 
-/// As [`element_type`], or the error that says so.
+/// As [`element_type`]. Errors: an unknown type, a curved face.
 pub(super) fn need_element_type<R: BufRead>(kind: i64, feed: &Feed<R>) -> Result<(usize, Role)> {
     match element_type(kind) {
         Some((_, Role::CurvedFace)) => {
             Err(feed.unsupported(format!("a curved face (element type {kind})")))
         }
         Some(found) => Ok(found),
-        None => Err(ReadError::Unsupported {
-            place: feed.place(),
-            what: format!("element type {kind}"),
-        }),
+        None => Err(feed.unsupported(format!("element type {kind}"))),
     }
 }

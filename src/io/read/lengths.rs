@@ -6,12 +6,12 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use super::error::{FilePlace, ReadError, Spot};
+use super::error::{FilePlace, ReadError, ReadFault, Spot};
 use super::feed::Result;
 use super::open::open_plain;
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
-/// Shorter lengths cannot be kept in single precision, with room for their inverse cubes in sums.
+/// Shorter lengths do not fit single precision with their inverse cubes in sums.
 const LENGTH_MIN: f64 = 1e-30;
 /// Longest head that is read.
 const HEAD_MAX: usize = 1 << 16;
@@ -19,38 +19,34 @@ const HEAD_MAX: usize = 1 << 16;
 /// Reads lengths above zero, holding at most `limit` bytes.
 ///
 /// # Errors
-/// What is no such file, not one-dimensional, not of 4 or 8 byte floating point numbers; the place of what is no length.
+/// Another kind of file, more than one dimension, numbers other than floating point of 4 or 8 bytes; the place of a bad length.
 pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
     let (from, length_of_file) = open_plain(path)?;
     let mut file = ArrayFile { from, name: path.display().to_string(), at: 0 };
     let (n, kind) = file.head()?;
     let needed = n.saturating_mul(8);
     if needed > limit {
-        return Err(ReadError::TooLarge {
-            place: file.place(Spot::Totals),
-            what: "the lengths",
-            needed,
-            limit,
-        });
+        let fault = ReadFault::TooLarge { what: "the lengths", needed, limit };
+        return Err(file.place(Spot::File).refuse(fault));
     }
     let mut lengths = Vec::with_capacity(n.min(length_of_file) as usize);
     for i in 0..n {
         let h = file.number(kind)?;
         if !(LENGTH_MIN..1.0 / LENGTH_MIN).contains(&h) {
             let expected = format!("a length from {LENGTH_MIN:e} to {:e}", 1.0 / LENGTH_MIN);
-            return Err(file.unexpected(Spot::Totals, &expected, format!("{h} as number {i}")));
+            return Err(file.unexpected(Spot::File, &expected, format!("{h} as number {i}")));
         }
         lengths.push(h);
     }
     if !file.from.fill_buf().is_ok_and(<[u8]>::is_empty) {
         let expected = "the end of the file behind its last number";
-        return Err(file.unexpected(Spot::Totals, expected, "more bytes".to_owned()));
+        return Err(file.unexpected(Spot::File, expected, "more bytes".to_owned()));
     }
     Ok(lengths)
 }
 
 /// Bytes of a number, and whether the high ones come first.
-type Kind = (usize, bool);
+type NumberFormat = (usize, bool);
 
 /// An array file, read from its beginning on.
 struct ArrayFile {
@@ -65,22 +61,22 @@ impl ArrayFile {
     }
 
     fn unexpected(&self, spot: Spot, expected: &str, found: String) -> ReadError {
-        ReadError::Unexpected { place: self.place(spot), expected: expected.to_owned(), found }
+        let expected = expected.to_owned();
+        self.place(spot).refuse(ReadFault::Unexpected { expected, found })
     }
 
     fn take(&mut self, n: usize) -> Result<Vec<u8>> {
         let mut bytes = vec![0; n];
         let read = self.from.read_exact(&mut bytes);
-        read.map_err(|e| ReadError::Truncated {
-            place: self.place(Spot::Byte(self.at)),
-            expected: format!("{n} more bytes"),
-            found: e.to_string(),
+        read.map_err(|e| {
+            let (expected, found) = (format!("{n} more bytes"), e.to_string());
+            self.place(Spot::Byte(self.at)).refuse(ReadFault::Truncated { expected, found })
         })?;
         self.at += n as u64;
         Ok(bytes)
     }
 
-    fn number(&mut self, (bytes, big): Kind) -> Result<f64> {
+    fn number(&mut self, (bytes, big): NumberFormat) -> Result<f64> {
         let mut word = self.take(bytes)?;
         if big {
             word.reverse();
@@ -92,7 +88,7 @@ impl ArrayFile {
     }
 
     /// Reads the head: how many numbers follow, and their kind.
-    fn head(&mut self) -> Result<(u64, Kind)> {
+    fn head(&mut self) -> Result<(u64, NumberFormat)> {
         let start = self.take(8)?;
         if !start.starts_with(MAGIC) {
             let found = format!("{:x?}", &start[..6]);

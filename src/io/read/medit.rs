@@ -1,192 +1,125 @@
-//! MEDIT `.mesh` text: keywords, each with a count and that many records of numbers.
+//! MEDIT meshes, `.mesh` and `.meshb`: triangles and quadrilaterals, references as labels.
+//!
+//! Solid elements are left out with a note. One tetrahedron of each reference but 0 marks a region.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
 use super::feed::Feed;
-use super::{ReadError, Result, SurfaceSink};
-use tetdb_base::geom::Point;
+use super::medit_numbers::{MeditNumbers, SectionRead};
+use super::{Result, SurfaceSink};
 use tetdb_base::surface::NoteKind;
 
-/// Solid elements, left out with a note.
-const SOLIDS: [&str; 4] = ["Hexahedra", "Prisms", "Pyramids", "TetrahedraP2"];
-
-pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
-    feed.comment = Some(b'#');
-    feed.need_keyword("MeshVersionFormatted")?;
-    feed.integer("the version")?;
+pub(super) fn read<R: BufRead>(
+    feed: Feed<R>,
+    is_binary: bool,
+    target: &mut SurfaceSink,
+) -> Result<()> {
+    let mut numbers = MeditNumbers::open(feed, is_binary)?;
+    numbers.text_version()?;
     let mut n_vertices = 0;
-    let mut more = feed.next_word()?;
-    while more {
-        let keyword = String::from_utf8_lossy(feed.word()).into_owned();
-        match keyword.to_ascii_lowercase().as_str() {
-            "end" => break,
+    numbers.sections(SectionRead::Whole, |numbers, keyword| {
+        match keyword {
             "dimension" => {
-                let dimension = feed.integer("the dimension")?;
+                let dimension = numbers.small_integer("the dimension")?;
                 if dimension != 3 {
-                    return Err(feed.unsupported(format!("a mesh of dimension {dimension}")));
+                    let what = format!("a mesh of dimension {dimension}");
+                    return Err(numbers.feed.unsupported(what));
                 }
-                more = feed.next_word()?;
             }
-            "vertices" => {
-                n_vertices += read_vertices(&mut feed, target)?;
-                more = feed.next_word()?;
+            "vertices" => n_vertices += read_vertices(numbers, target)?,
+            "triangles" => read_faces::<3, _>(numbers, "triangles", n_vertices, target)?,
+            "quadrilaterals" => read_faces::<4, _>(numbers, "quadrilaterals", n_vertices, target)?,
+            "tetrahedra" => read_tets(numbers, n_vertices, target)?,
+            "trianglesp2" | "quadrilateralsq2" => {
+                return Err(numbers.feed.unsupported("curved triangles"));
             }
-            "triangles" => {
-                read_faces(&mut feed, "triangles", 3, n_vertices, target)?;
-                more = feed.next_word()?;
+            _ => {
+                if let Some(what) = solid(keyword) {
+                    let n = numbers.skipped_count()?;
+                    note_skipped(what, n, target);
+                }
+                return Ok(SectionRead::Part);
             }
-            "quadrilaterals" => {
-                read_faces(&mut feed, "quadrilaterals", 4, n_vertices, target)?;
-                more = feed.next_word()?;
-            }
-            "tetrahedra" => {
-                read_tets(&mut feed, n_vertices, target)?;
-                more = feed.next_word()?;
-            }
-            "trianglesp2" | "quadrilateralsq2" => return Err(feed.unsupported("curved triangles")),
-            _ if feed.word().first().is_some_and(u8::is_ascii_alphabetic) => {
-                more = skip_section(&mut feed, &keyword, target)?;
-            }
-            _ => return Err(feed.unexpected("a MEDIT keyword", feed.word())),
         }
-    }
-    feed.finish(target.builder)
+        Ok(SectionRead::Whole)
+    })?;
+    numbers.feed.finish(target.builder)
 }
 
-fn read_vertices<R: BufRead>(feed: &mut Feed<R>, target: &mut SurfaceSink) -> Result<u64> {
-    let n = feed.count("vertices", 8)?;
+/// Name of the solid elements of a section that is skipped.
+fn solid(keyword: &str) -> Option<&'static str> {
+    Some(match keyword {
+        "hexahedra" => "hexahedra",
+        "prisms" => "prisms",
+        "pyramids" => "pyramids",
+        "tetrahedrap2" => "tetrahedra",
+        _ => return None,
+    })
+}
+
+fn note_skipped(what: &'static str, n: u64, target: &mut SurfaceSink) {
+    if n > 0 {
+        target.builder.note(NoteKind::SkippedElements { what, n });
+    }
+}
+
+fn read_vertices<R: BufRead>(
+    numbers: &mut MeditNumbers<R>,
+    target: &mut SurfaceSink,
+) -> Result<u64> {
+    let n = numbers.count("vertices", 3, 1)?;
     for i in 0..n {
-        if feed.at_end()? {
-            return Err(feed.too_few("vertices", n, i));
-        }
-        let p: Point = feed.point()?;
-        feed.integer("a vertex reference")?;
-        feed.placed(target.builder.vertex(p))?;
+        numbers.feed.need_record("vertices", n, i)?;
+        let p = numbers.point()?;
+        numbers.integer("a vertex reference")?;
+        numbers.feed.placed(target.builder.vertex(p))?;
     }
     Ok(n)
 }
 
-fn read_faces<R: BufRead>(
-    feed: &mut Feed<R>,
+fn read_faces<const N: usize, R: BufRead>(
+    numbers: &mut MeditNumbers<R>,
     what: &'static str,
-    n_corners: usize,
     n_vertices: u64,
     target: &mut SurfaceSink,
 ) -> Result<()> {
-    let n = feed.count(what, 2 * (n_corners as u64 + 1))?;
-    let mut labels = RefLabels::default();
+    let n = numbers.count(what, 0, N as u64 + 1)?;
+    // The last reference and its label: neighbors in a file mostly agree.
+    let mut last = None;
     for i in 0..n {
-        if feed.at_end()? {
-            return Err(feed.too_few(what, n, i));
-        }
-        let mut corners = [0; 4];
-        for corner in &mut corners[..n_corners] {
-            *corner = feed.index(1, n_vertices)?;
-        }
-        let label = labels.of(feed.integer("a reference")?, target);
-        feed.placed(target.builder.polygon(&corners[..n_corners], label))?;
+        numbers.feed.need_record(what, n, i)?;
+        let corners = numbers.corners::<N>(n_vertices)?;
+        let reference = numbers.integer("a reference")?;
+        let label = match last {
+            Some((known, label)) if known == reference => label,
+            _ => target.label(&reference.to_string()),
+        };
+        last = Some((reference, label));
+        numbers.feed.placed(target.builder.polygon(&corners, label))?;
     }
     Ok(())
 }
 
 /// Tetrahedra are left out, but for one of each reference: it marks a region.
 fn read_tets<R: BufRead>(
-    feed: &mut Feed<R>,
+    numbers: &mut MeditNumbers<R>,
     n_vertices: u64,
     target: &mut SurfaceSink,
 ) -> Result<()> {
-    let n = feed.count("tetrahedra", 10)?;
+    let n = numbers.count("tetrahedra", 0, 5)?;
     let mut first = BTreeMap::new();
     for i in 0..n {
-        if feed.at_end()? {
-            return Err(feed.too_few("tetrahedra", n, i));
+        numbers.feed.need_record("tetrahedra", n, i)?;
+        let corners = numbers.corners(n_vertices)?;
+        let reference = numbers.integer("a reference")?;
+        if reference != 0 {
+            first.entry(format!("ref_{reference}")).or_insert_with(|| vec![corners]);
         }
-        let mut corners = [0; 4];
-        for corner in &mut corners {
-            *corner = feed.index(1, n_vertices)?;
-        }
-        note_reference(&mut first, feed.integer("a reference")?, corners);
     }
-    note_tets(n, &first, target);
-    Ok(())
-}
-
-/// Keeps the first tetrahedron of each reference but 0, which means none.
-pub(super) fn note_reference(
-    first: &mut BTreeMap<String, Vec<[u32; 4]>>,
-    reference: i64,
-    corners: [u32; 4],
-) {
-    if reference != 0 {
-        let known = first.entry(format!("ref_{reference}"));
-        known.or_insert_with(|| vec![corners]);
-    }
-}
-
-/// Says that tetrahedra were left out, and what regions they mark.
-pub(super) fn note_tets(n: u64, first: &BTreeMap<String, Vec<[u32; 4]>>, target: &mut SurfaceSink) {
+    note_skipped("tetrahedra", n, target);
     if n > 0 {
-        let what = "tetrahedra";
-        target.builder.note(NoteKind::SkippedElements { what, n });
-        target.regions_of_mesh(first);
+        target.regions_of_mesh(&first);
     }
-}
-
-/// Label ids of integer references; remembers the last, because neighbors in a file mostly agree.
-#[derive(Default)]
-pub(super) struct RefLabels {
-    last: Option<(i64, u32)>,
-}
-
-impl RefLabels {
-    pub fn of(&mut self, reference: i64, target: &mut SurfaceSink) -> u32 {
-        match self.last {
-            Some((known, label)) if known == reference => label,
-            _ => {
-                let label = target.label(&reference.to_string());
-                self.last = Some((reference, label));
-                label
-            }
-        }
-    }
-}
-
-/// Passes over a section that is not needed; true when another keyword is now the last word.
-fn skip_section<R: BufRead>(
-    feed: &mut Feed<R>,
-    keyword: &str,
-    target: &mut SurfaceSink,
-) -> Result<bool> {
-    let solid = SOLIDS.iter().find(|s| s.eq_ignore_ascii_case(keyword));
-    let mut first = true;
-    while feed.next_word()? {
-        if feed.word().first().is_some_and(u8::is_ascii_alphabetic) {
-            return Ok(true);
-        }
-        if let (true, Some(what)) = (first, solid) {
-            let n: u64 = feed.parse("the number of elements")?;
-            if n > 0 {
-                target.builder.note(NoteKind::SkippedElements { what: lower(what), n });
-            }
-        }
-        first = false;
-    }
-    if solid.is_some() && first {
-        return Err(ReadError::Truncated {
-            place: feed.place(),
-            expected: "the number of elements".to_owned(),
-            found: "the end of the file".to_owned(),
-        });
-    }
-    Ok(false)
-}
-
-fn lower(what: &str) -> &'static str {
-    match what {
-        "Hexahedra" => "hexahedra",
-        "Prisms" => "prisms",
-        "Pyramids" => "pyramids",
-        _ => "tetrahedra",
-    }
+    Ok(())
 }

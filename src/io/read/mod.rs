@@ -1,16 +1,18 @@
 //! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen; sizes at the vertices of MEDIT meshes; files of edges and points.
 //!
-//! A declared count is believed only after it was compared with the length of the file; every error
-//! tells its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
+//! A declared count is compared with the length of the file before it is used; every error
+//! has its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
 //! become doubles exactly. Polygons are fanned, vertices with identical bits are one.
 
+mod embedded;
+mod embedded_sink;
 mod error;
 mod feed;
 mod gmsh;
 mod gmsh_numbers;
 mod lengths;
 mod medit;
-mod meditb;
+mod medit_numbers;
 mod obj;
 mod off;
 mod open;
@@ -20,8 +22,6 @@ mod sizes;
 mod stl;
 mod tetgen;
 mod vtk;
-mod wire_sink;
-mod wires;
 
 #[cfg(test)]
 mod collection;
@@ -31,15 +31,15 @@ mod tests;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
-pub use error::{FilePlace, ReadError, Spot};
+pub use embedded::read_wires;
+pub use embedded_sink::WireKind;
+pub use error::{FilePlace, ReadError, ReadFault, Spot};
 use feed::{Feed, Result};
 pub use lengths::read_lengths;
 pub use open::is_stream;
 use open::{open, stem, unpacked_name};
 use sink::SurfaceSink;
 pub use sizes::{FileSizes, read_sizes, size_files};
-pub use wire_sink::WireKind;
-pub use wires::read_wires;
 
 use tetdb_base::surface::{Surface, SurfaceBuilder, SurfaceError};
 
@@ -67,8 +67,8 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format a file name's extension tells; `.gz` and `.zst` behind it are passed over.
-    pub fn of_extension(path: &Path) -> Option<Self> {
+    /// The format of a file name's extension; a final `.gz` or `.zst` is skipped.
+    pub fn from_extension(path: &Path) -> Option<Self> {
         let path = unpacked_name(path);
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         Some(match extension.as_str() {
@@ -85,8 +85,8 @@ impl Format {
         })
     }
 
-    /// The format the first bytes of a file tell, for names that do not.
-    fn of_head(head: &[u8], length: u64) -> Option<Self> {
+    /// The format of a file's first bytes, for names without a known extension.
+    fn from_head(head: &[u8], length: u64) -> Option<Self> {
         let starts = |word: &str| {
             head.get(..word.len()).is_some_and(|h| h.eq_ignore_ascii_case(word.as_bytes()))
         };
@@ -108,14 +108,14 @@ impl Format {
     }
 }
 
-/// Whether a length is the one a binary STL with this head must have.
+/// Returns whether a length is that of a binary STL with this head.
 fn is_binary_stl(head: &[u8], length: u64) -> bool {
     head.get(80..84)
         .and_then(|count| count.try_into().ok())
         .is_some_and(|count| length == 84 + 50 * u64::from(u32::from_le_bytes(count)))
 }
 
-/// The kind of solid model a file is, of those that hold no triangles.
+/// The kind of solid model, for files without triangles.
 fn solid_model(path: &Path, head: &[u8]) -> Option<&'static str> {
     let name = unpacked_name(path);
     let extension = name.extension().unwrap_or_default().to_string_lossy();
@@ -131,10 +131,10 @@ fn solid_model(path: &Path, head: &[u8]) -> Option<&'static str> {
 /// Smaller surfaces are refused: single precision, in which wanted lengths are kept, ends at 1e-38.
 const EXTENT_MIN: f64 = 1e-24;
 
-/// Reads files as one surface, each with its name before its labels when there are several.
+/// Reads files as one surface; with several files, each label begins with the name of its file.
 ///
-/// `cap`: bytes of memory that the surface may take. Packed files (`.gz`, `.zst`), pipes and `-`, the standard input, are held unpacked while
-/// they are read: in a quarter of it at most.
+/// `cap`: bytes of memory for the surface. Packed files (`.gz`, `.zst`), pipes and `-`, the standard input, are held unpacked while
+/// they are read, in at most a quarter of `cap`.
 ///
 /// # Errors
 /// The first [`ReadError`], with its file and place; nothing is repaired beyond welding and fanning.
@@ -151,18 +151,15 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
     let surface = builder.finish();
     let bounds = surface.bounds();
     let extent = (bounds.high - bounds.low).max_element();
-    // Points and nothing else are a matter of validation.
+    // Validation refuses surfaces of points alone.
     if extent > 0.0 && extent < EXTENT_MIN {
-        let file = paths.first().map(|p| p.display().to_string());
-        return Err(ReadError::Surface {
-            place: FilePlace { file: file.unwrap_or_default(), spot: Spot::Totals },
-            source: SurfaceError::TooSmall { extent },
-        });
+        let place = FilePlace::new(paths.first().map_or(Path::new(""), |path| path));
+        return Err(place.refuse(ReadFault::Surface(SurfaceError::TooSmall { extent })));
     }
     Ok(surface)
 }
 
-/// Reads a file that is in memory, called `file` in messages; for tests and fuzzing.
+/// Reads a file from memory; messages name it `file`. For tests and fuzzing.
 ///
 /// TetGen files that refer to a separate `.node` file are refused.
 ///
@@ -178,6 +175,10 @@ pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> 
     Ok(builder.finish())
 }
 
+const UNKNOWN_FORMAT: ReadFault = ReadFault::UnknownFormat(
+    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds, with .gz or .zst behind it where it is packed",
+);
+
 fn unique(stem: &str, taken: &[String]) -> String {
     let mut name = stem.to_owned();
     let mut n = 1;
@@ -189,26 +190,18 @@ fn unique(stem: &str, taken: &[String]) -> String {
 }
 
 fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
+    let place = FilePlace::new(path);
     if let Some(kind) = solid_model(path, b"") {
-        return Err(ReadError::SolidModel { place: FilePlace::of_file(path), kind });
+        return Err(place.refuse(ReadFault::SolidModel(kind)));
     }
     let mut feed = open(path, limit)?;
-    let format = match Format::of_extension(path) {
+    let format = match Format::from_extension(path) {
         Some(format) => format,
         None => {
             let (length, head) = (feed.len, feed.head()?);
-            let found = Format::of_head(head, length);
+            let found = Format::from_head(head, length);
             let kind = solid_model(path, head);
-            found.ok_or_else(|| {
-                let place = FilePlace::of_file(path);
-                match kind {
-                    Some(kind) => ReadError::SolidModel { place, kind },
-                    None => ReadError::UnknownFormat {
-                        place,
-                        help: "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds, with .gz or .zst behind it where it is packed",
-                    },
-                }
-            })?
+            found.ok_or_else(|| place.refuse(kind.map_or(UNKNOWN_FORMAT, ReadFault::SolidModel)))?
         }
     };
     target.builder.begin_file(feed.file());
@@ -225,19 +218,17 @@ fn read_feed<R: BufRead>(
     target: &mut SurfaceSink,
 ) -> Result<()> {
     if feed.len == 0 {
-        return Err(ReadError::Empty {
-            place: FilePlace { file: feed.file().to_owned(), spot: Spot::Totals },
-        });
+        return Err(feed.empty());
     }
     match format {
         Format::Stl => stl::read(feed, target),
         Format::Off => off::read(feed, target),
         Format::Obj => obj::read(feed, target),
         Format::Ply => ply::read(feed, target),
-        Format::Medit => medit::read(feed, target),
-        Format::MeditBinary => meditb::read(feed, target),
+        Format::Medit => medit::read(feed, false, target),
+        Format::MeditBinary => medit::read(feed, true, target),
         Format::Gmsh => gmsh::read(feed, target),
-        Format::TetgenSmesh => tetgen::read(feed, tetgen::Kind::Smesh, nodes, limit, target),
-        Format::TetgenPoly => tetgen::read(feed, tetgen::Kind::Poly, nodes, limit, target),
+        Format::TetgenSmesh => tetgen::read(feed, tetgen::FacetLayout::Smesh, nodes, limit, target),
+        Format::TetgenPoly => tetgen::read(feed, tetgen::FacetLayout::Poly, nodes, limit, target),
     }
 }

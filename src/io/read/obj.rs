@@ -1,17 +1,17 @@
 //! Wavefront OBJ: `v` and `f` lines; groups, objects or materials as labels.
 //!
-//! A face names vertices from 1, or backwards from the last one as −1, with texture and normal
-//! numbers after slashes, which are passed over. A backslash continues a line.
+//! A face names vertices from 1, or backwards from the last one as −1. Texture and normal numbers after slashes are skipped. A backslash
+//! continues a line.
 
 use std::io::BufRead;
 
-use super::feed::{Feed, parse, quote};
-use super::wire_sink::{WireKind, WireSink};
-use super::{ReadError, Result, SurfaceSink};
+use super::embedded_sink::{EmbeddedSink, WireKind};
+use super::feed::{Feed, not_a_number, parse, quote};
+use super::{FilePlace, ReadError, ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
 
-/// Names in force; the most telling one is the label of a face.
+/// Names in force; the first of group, object and material that is not empty is the label of a face.
 #[derive(Default)]
 struct Names {
     group: String,
@@ -20,7 +20,7 @@ struct Names {
 }
 
 impl Names {
-    /// Takes a line that names what follows; says whether it is one.
+    /// Takes the name of a line that names the elements after it; returns whether the line is one.
     fn take(&mut self, word: &[u8], line: &[u8]) -> bool {
         let name = || super::feed::name(&line[word.len()..]);
         match word {
@@ -47,7 +47,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     let mut line = Vec::new();
     let mut corners = Vec::new();
     // Vertex numbers beyond those known when they were named, each larger than the one before.
-    let mut ahead: Vec<(u32, super::FilePlace)> = Vec::new();
+    let mut ahead: Vec<(u32, FilePlace)> = Vec::new();
     let mut n_lines_points = 0;
     loop {
         let place = feed.place();
@@ -80,18 +80,15 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
             b"l" | b"p" => n_lines_points += 1,
             word if names.take(word, &line) => label = None,
             b"curv" | b"curv2" | b"surf" => {
-                return Err(ReadError::Unsupported {
-                    place,
-                    what: "a free-form curve or surface".to_owned(),
-                });
+                let what = "a free-form curve or surface".to_owned();
+                return Err(place.refuse(ReadFault::Unsupported(what)));
             }
             _ => {}
         }
     }
     let known = target.builder.n_file_vertices() as u32;
     if let Some((index, place)) = ahead.into_iter().find(|(index, _)| *index >= known) {
-        let (index, high) = (i64::from(index) + 1, i64::from(known));
-        return Err(ReadError::IndexOutOfRange { place, index, low: 1, high });
+        return Err(out_of_range(&place, i64::from(index) + 1, i64::from(known)));
     }
     if n_lines_points > 0 {
         target
@@ -110,7 +107,7 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 fn vertex<'a, R: BufRead>(
     feed: &Feed<R>,
     mut words: impl Iterator<Item = &'a [u8]>,
-    place: &super::FilePlace,
+    place: &FilePlace,
 ) -> Result<Point> {
     let mut p = [0.0; 3];
     for x in &mut p {
@@ -121,10 +118,10 @@ fn vertex<'a, R: BufRead>(
 }
 
 /// Reads `l` lines as edges, or `p` lines as points; a line of them may name vertices that come later.
-pub(super) fn read_wires<R: BufRead>(
+pub(super) fn read_embedded<R: BufRead>(
     mut feed: Feed<R>,
     kind: WireKind,
-    sink: &mut WireSink,
+    sink: &mut EmbeddedSink,
 ) -> Result<()> {
     let mut names = Names::default();
     let mut line = Vec::new();
@@ -157,12 +154,7 @@ pub(super) fn read_wires<R: BufRead>(
     let n = sink.set.points.len();
     match ahead.into_iter().find(|(v, _)| *v as usize >= n) {
         None => Ok(()),
-        Some((v, place)) => Err(ReadError::IndexOutOfRange {
-            place,
-            index: i64::from(v) + 1,
-            low: 1,
-            high: n as i64,
-        }),
+        Some((v, place)) => Err(out_of_range(&place, i64::from(v) + 1, n as i64)),
     }
 }
 
@@ -188,29 +180,20 @@ fn read_logical_line<R: BufRead>(feed: &mut Feed<R>, line: &mut Vec<u8>) -> Resu
 }
 
 /// The 0-based vertex of one corner, `known` being the number of vertices so far.
-fn corner(word: &[u8], known: u32, place: &super::FilePlace) -> Result<u32> {
+fn corner(word: &[u8], known: u32, place: &FilePlace) -> Result<u32> {
     let number = word.split(|&b| b == b'/').next().unwrap_or_default();
     let index: i64 = parse(number).ok_or_else(|| not_a_number(place, "a vertex number", word))?;
     let zero_based = if index > 0 { index - 1 } else { i64::from(known).saturating_add(index) };
     match u32::try_from(zero_based) {
         Ok(i) if index != 0 && i < u32::MAX => Ok(i),
-        _ => Err(ReadError::IndexOutOfRange {
-            place: place.clone(),
-            index,
-            low: 1,
-            high: i64::from(known),
-        }),
+        _ => Err(out_of_range(place, index, i64::from(known))),
     }
 }
 
-fn unexpected(place: &super::FilePlace, expected: &str, found: &[u8]) -> ReadError {
-    ReadError::Unexpected {
-        place: place.clone(),
-        expected: expected.to_owned(),
-        found: quote(found),
-    }
+fn out_of_range(place: &FilePlace, index: i64, high: i64) -> ReadError {
+    place.refuse(ReadFault::IndexOutOfRange { index, low: 1, high })
 }
 
-fn not_a_number(place: &super::FilePlace, what: &'static str, found: &[u8]) -> ReadError {
-    ReadError::NotANumber { place: place.clone(), what, found: quote(found) }
+fn unexpected(place: &FilePlace, expected: &str, found: &[u8]) -> ReadError {
+    place.refuse(ReadFault::Unexpected { expected: expected.to_owned(), found: quote(found) })
 }

@@ -1,7 +1,7 @@
 //! OFF: a header word, three counts, vertices, faces of any number of corners.
 //!
-//! What follows the coordinates of a vertex or the corners of a face on its line (colors, normals)
-//! is passed over. `#` begins a comment.
+//! Colors and normals after the coordinates of a vertex or the corners of a face are skipped. `#` begins a
+//! comment.
 
 use std::io::BufRead;
 

@@ -4,12 +4,12 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
-use super::error::{FilePlace, ReadError};
+use super::error::{FilePlace, ReadError, ReadFault};
 use super::feed::{self, Feed, Result};
 
 /// Bytes of the read buffer of one file.
 const BUFFER_BYTES: usize = 256 << 10;
-/// A zstd frame may ask for a window of 2 to this power bytes: 32 MiB, beyond what any ordinary level asks for.
+/// Largest window of a zstd frame, as a power of 2: 32 MiB, which is more than ordinary levels need.
 const WINDOW_LOG_MAX: u32 = 25;
 
 /// A file of any kind, to be read once.
@@ -17,17 +17,17 @@ pub(super) type Reader = Box<dyn BufRead>;
 
 /// How the bytes of a file are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Packing {
+enum Compression {
     Gzip,
     Zstd,
 }
 
-/// The packing that the end of a name tells, and the name without it.
-fn packing(path: &Path) -> Option<(Packing, PathBuf)> {
+/// The packing by the ending of a name, and the name without the ending.
+fn packing(path: &Path) -> Option<(Compression, PathBuf)> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     let packing = match extension.as_str() {
-        "gz" => Packing::Gzip,
-        "zst" => Packing::Zstd,
+        "gz" => Compression::Gzip,
+        "zst" => Compression::Zstd,
         _ => return None,
     };
     Some((packing, path.with_extension("")))
@@ -38,7 +38,7 @@ pub(super) fn unpacked_name(path: &Path) -> PathBuf {
     packing(path).map_or_else(|| path.to_owned(), |(_, inner)| inner)
 }
 
-/// What a file is called, without folder and endings.
+/// The name of a file without folder and endings.
 pub(super) fn stem(path: &Path) -> String {
     let name = unpacked_name(path);
     let text = name.file_stem().unwrap_or_default().to_string_lossy();
@@ -46,7 +46,7 @@ pub(super) fn stem(path: &Path) -> String {
     if name.is_empty() { "surface".to_owned() } else { name }
 }
 
-/// Whether what stands here can be read but once: a pipe, or `-`, the standard input.
+/// Returns whether a path can be read only once: a pipe, or `-`, the standard input.
 pub fn is_stream(path: &Path) -> bool {
     path == Path::new("-") || std::fs::metadata(path).is_ok_and(|meta| is_pipe(&meta))
 }
@@ -62,25 +62,25 @@ fn is_pipe(_: &std::fs::Metadata) -> bool {
     false
 }
 
-/// Opens a regular file, plain or packed, or a pipe. Of what is packed or piped at most `limit` bytes are held.
+/// Opens a regular file, plain or packed, or a pipe. Packed and piped files are held unpacked, in at most `limit` bytes.
 pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
     let name = path.to_string_lossy();
     let unpack: Reader = match packing(path) {
-        Some((Packing::Gzip, _)) => {
+        Some((Compression::Gzip, _)) => {
             let (reader, _) = open_plain(path)?;
             Box::new(BufReader::new(flate2::bufread::MultiGzDecoder::new(reader)))
         }
-        Some((Packing::Zstd, _)) => {
+        Some((Compression::Zstd, _)) => {
             let (reader, _) = open_plain(path)?;
             let decoder = zstd::stream::read::Decoder::with_buffer(reader).and_then(|mut d| {
                 d.window_log_max(WINDOW_LOG_MAX)?;
                 Ok(d)
             });
-            Box::new(BufReader::new(decoder.map_err(|e| unreadable(path, e.to_string()))?))
+            Box::new(BufReader::new(decoder.map_err(|e| unreadable(path, e))?))
         }
         None if path == Path::new("-") => Box::new(BufReader::new(std::io::stdin())),
         None if is_stream(path) => {
-            let file = File::open(path).map_err(|e| unreadable(path, e.to_string()))?;
+            let file = File::open(path).map_err(|e| unreadable(path, e))?;
             Box::new(BufReader::new(file))
         }
         None => {
@@ -97,32 +97,28 @@ pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
 fn within(from: Reader, path: &Path, limit: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let read = from.take(limit.saturating_add(1)).read_to_end(&mut bytes);
-    read.map_err(|e| unreadable(path, e.to_string()))?;
+    read.map_err(|e| unreadable(path, e))?;
     if bytes.len() as u64 > limit {
-        return Err(ReadError::TooLarge {
-            place: FilePlace::of_file(path),
-            what: "the unpacked file",
-            needed: bytes.len() as u64,
-            limit,
-        });
+        let (what, needed) = ("the unpacked file", bytes.len() as u64);
+        let fault = ReadFault::TooLarge { what, needed, limit };
+        return Err(FilePlace::new(path).refuse(fault));
     }
     Ok(bytes)
 }
 
-/// Opens a regular file; tells its length.
+/// Opens a regular file; returns its length too.
 ///
 /// # Errors
-/// A pipe or a device, before it is opened: that could take for ever, and so could reading it.
+/// A pipe or a device, before it is opened: opening or reading one could take for ever.
 pub(super) fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
-    let meta = std::fs::metadata(path).map_err(|e| unreadable(path, e.to_string()))?;
+    let meta = std::fs::metadata(path).map_err(|e| unreadable(path, e))?;
     if !meta.is_file() {
-        let reason = "it is not a regular file".to_owned();
-        return Err(unreadable(path, reason));
+        return Err(unreadable(path, "it is not a regular file"));
     }
-    let file = File::open(path).map_err(|e| unreadable(path, e.to_string()))?;
+    let file = File::open(path).map_err(|e| unreadable(path, e))?;
     Ok((BufReader::with_capacity(BUFFER_BYTES, file), meta.len()))
 }
 
-fn unreadable(path: &Path, reason: String) -> ReadError {
-    ReadError::Unreadable { place: FilePlace::of_file(path), reason }
+fn unreadable(path: &Path, reason: impl ToString) -> ReadError {
+    FilePlace::new(path).refuse(ReadFault::Unreadable(reason.to_string()))
 }

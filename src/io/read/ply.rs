@@ -3,7 +3,7 @@
 use std::io::BufRead;
 
 use super::feed::{Feed, parse};
-use super::{ReadError, Result, SurfaceSink};
+use super::{Result, Spot, SurfaceSink};
 use tetdb_base::geom::Point;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -71,31 +71,41 @@ struct Header {
     elements: Vec<Element>,
 }
 
+/// The elements of a file being read.
+struct PlyReader<R> {
+    feed: Feed<R>,
+    encoding: Encoding,
+}
+
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let header = read_header(&mut feed)?;
-    feed.binary = header.encoding != Encoding::Text;
+    let encoding = header.encoding;
+    feed.at.is_binary = encoding != Encoding::Text;
+    let mut reader = PlyReader { feed, encoding };
     let n_vertices = header.elements.iter().find(|e| e.name == "vertex").map_or(0, |e| e.n);
     for element in &header.elements {
-        let n = check_count(&feed, &header, element)?;
+        let n = check_count(&reader.feed, encoding, element)?;
         match element.name.as_str() {
-            "vertex" => read_vertices(&mut feed, header.encoding, element, n, target)?,
-            "face" => read_faces(&mut feed, header.encoding, element, n, n_vertices, target)?,
-            "tristrips" if n > 0 => return Err(feed.unsupported("PLY triangle strips")),
+            "vertex" => reader.read_vertices(element, n, target)?,
+            "face" => reader.read_faces(element, n, n_vertices, target)?,
+            "tristrips" if n > 0 => {
+                return Err(reader.feed.unsupported("PLY triangle strips"));
+            }
             _ => {
                 for _ in 0..n {
                     for property in &element.properties {
-                        skip(&mut feed, header.encoding, property)?;
+                        reader.skip(property)?;
                     }
                 }
             }
         }
     }
-    feed.finish(target.builder)
+    reader.feed.finish(target.builder)
 }
 
 /// Compares an element's count with the bytes left: each property takes its size, or two in text.
-fn check_count<R: BufRead>(feed: &Feed<R>, header: &Header, element: &Element) -> Result<u64> {
-    let bytes: u64 = match header.encoding {
+fn check_count<R: BufRead>(feed: &Feed<R>, encoding: Encoding, element: &Element) -> Result<u64> {
+    let bytes: u64 = match encoding {
         Encoding::Text => 2 * element.properties.len() as u64,
         _ => element.properties.iter().map(|p| p.count.unwrap_or(p.value).bytes()).sum(),
     };
@@ -104,13 +114,8 @@ fn check_count<R: BufRead>(feed: &Feed<R>, header: &Header, element: &Element) -
         "face" => "faces",
         _ => "elements",
     };
-    feed.check_count(name, element.n, bytes.max(1)).map_err(|e| match e {
-        ReadError::CountMismatch { mut place, what, declared, found } => {
-            place.spot = super::Spot::Line(element.line);
-            ReadError::CountMismatch { place, what, declared, found }
-        }
-        e => e,
-    })
+    let counted = feed.check_count(name, element.n, bytes.max(1));
+    counted.map_err(|e| e.at_spot(Spot::Line(element.line)))
 }
 
 fn read_header<R: BufRead>(feed: &mut Feed<R>) -> Result<Header> {
@@ -120,18 +125,14 @@ fn read_header<R: BufRead>(feed: &mut Feed<R>) -> Result<Header> {
     let mut first = true;
     loop {
         bytes.clear();
-        let line = feed.line;
+        let line = feed.at.line;
         if !feed.read_line(&mut bytes)? {
             return Err(feed.truncated("`end_header`"));
         }
         let text = String::from_utf8_lossy(&bytes).into_owned();
         let words: Vec<&str> = text.split_whitespace().collect();
         let wrong = |feed: &Feed<R>, expected: &str| {
-            let mut error = feed.unexpected(expected, &bytes);
-            if let ReadError::Unexpected { place, .. } = &mut error {
-                place.spot = super::Spot::Line(line);
-            }
-            Err(error)
+            Err(feed.unexpected(expected, &bytes).at_spot(Spot::Line(line)))
         };
         match words.as_slice() {
             ["ply"] if first => {}
@@ -180,140 +181,126 @@ fn read_header<R: BufRead>(feed: &mut Feed<R>) -> Result<Header> {
     }
 }
 
-/// One scalar as a double; every type of the format fits.
-fn scalar<R: BufRead>(feed: &mut Feed<R>, encoding: Encoding, scalar: Scalar) -> Result<f64> {
-    macro_rules! number {
-        ($type:ty, $n:literal) => {{
-            let bytes = feed.bytes::<$n>()?;
-            f64::from(if encoding == Encoding::Little {
-                <$type>::from_le_bytes(bytes)
-            } else {
-                <$type>::from_be_bytes(bytes)
-            })
-        }};
-    }
-    if encoding == Encoding::Text {
-        feed.need_word("a number")?;
-        return feed.parse("a number");
-    }
-    Ok(match scalar {
-        Scalar::I8 => number!(i8, 1),
-        Scalar::U8 => number!(u8, 1),
-        Scalar::I16 => number!(i16, 2),
-        Scalar::U16 => number!(u16, 2),
-        Scalar::I32 => number!(i32, 4),
-        Scalar::U32 => number!(u32, 4),
-        Scalar::F32 => number!(f32, 4),
-        Scalar::F64 => number!(f64, 8),
-    })
-}
-
-fn integer<R: BufRead>(feed: &mut Feed<R>, encoding: Encoding, kind: Scalar) -> Result<i64> {
-    let value = scalar(feed, encoding, kind)?;
-    if value.fract() != 0.0 || value.abs() > 9e15 {
-        let text = value.to_string();
-        return Err(feed.unexpected("a whole number", text.as_bytes()));
-    }
-    Ok(value as i64)
-}
-
-/// The length of a list, compared with the bytes left.
-fn list_len<R: BufRead>(
-    feed: &mut Feed<R>,
-    encoding: Encoding,
-    count: Scalar,
-    value: Scalar,
-) -> Result<u64> {
-    let n = integer(feed, encoding, count)?;
-    let bytes = if encoding == Encoding::Text { 2 } else { value.bytes() };
-    feed.check_count("list items", n, bytes)
-}
-
-fn skip<R: BufRead>(feed: &mut Feed<R>, encoding: Encoding, property: &Property) -> Result<()> {
-    let n = match property.count {
-        Some(count) => list_len(feed, encoding, count, property.value)?,
-        None => 1,
-    };
-    if encoding != Encoding::Text {
-        return feed.skip_bytes(n * property.value.bytes());
-    }
-    for _ in 0..n {
-        feed.need_word("a number")?;
-    }
-    Ok(())
-}
-
-fn read_vertices<R: BufRead>(
-    feed: &mut Feed<R>,
-    encoding: Encoding,
-    element: &Element,
-    n: u64,
-    target: &mut SurfaceSink,
-) -> Result<()> {
-    let axis =
-        |p: &Property| ["x", "y", "z"].iter().position(|a| p.count.is_none() && *a == p.name);
-    let axes: Vec<Option<usize>> = element.properties.iter().map(axis).collect();
-    if (0..3).any(|a| axes.iter().filter(|x| **x == Some(a)).count() != 1) {
-        return Err(feed.unexpected("vertex properties x, y and z", b"others"));
-    }
-    for i in 0..n {
-        if encoding == Encoding::Text && feed.at_end()? {
-            return Err(feed.too_few("vertices", n, i));
+impl<R: BufRead> PlyReader<R> {
+    /// One scalar as a double; every type of the format fits.
+    fn scalar(&mut self, kind: Scalar) -> Result<f64> {
+        macro_rules! number {
+            ($type:ty, $n:literal) => {{
+                let bytes = self.feed.bytes::<$n>()?;
+                f64::from(if self.encoding == Encoding::Little {
+                    <$type>::from_le_bytes(bytes)
+                } else {
+                    <$type>::from_be_bytes(bytes)
+                })
+            }};
         }
-        let mut p = [0.0; 3];
-        for (property, axis) in element.properties.iter().zip(&axes) {
-            match axis {
-                Some(a) => {
-                    let x = scalar(feed, encoding, property.value)?;
-                    p[*a] = feed.checked(x)?;
+        if self.encoding == Encoding::Text {
+            self.feed.need_word("a number")?;
+            return self.feed.parse("a number");
+        }
+        Ok(match kind {
+            Scalar::I8 => number!(i8, 1),
+            Scalar::U8 => number!(u8, 1),
+            Scalar::I16 => number!(i16, 2),
+            Scalar::U16 => number!(u16, 2),
+            Scalar::I32 => number!(i32, 4),
+            Scalar::U32 => number!(u32, 4),
+            Scalar::F32 => number!(f32, 4),
+            Scalar::F64 => number!(f64, 8),
+        })
+    }
+
+    fn integer(&mut self, kind: Scalar) -> Result<i64> {
+        let value = self.scalar(kind)?;
+        if value.fract() != 0.0 || value.abs() > 9e15 {
+            let text = value.to_string();
+            return Err(self.feed.unexpected("a whole number", text.as_bytes()));
+        }
+        Ok(value as i64)
+    }
+
+    /// The length of a list, compared with the bytes left.
+    fn list_len(&mut self, count: Scalar, value: Scalar) -> Result<u64> {
+        let n = self.integer(count)?;
+        let bytes = if self.encoding == Encoding::Text { 2 } else { value.bytes() };
+        self.feed.check_count("list items", n, bytes)
+    }
+
+    fn skip(&mut self, property: &Property) -> Result<()> {
+        let n = match property.count {
+            Some(count) => self.list_len(count, property.value)?,
+            None => 1,
+        };
+        if self.encoding != Encoding::Text {
+            return self.feed.skip_bytes(n * property.value.bytes());
+        }
+        for _ in 0..n {
+            self.feed.need_word("a number")?;
+        }
+        Ok(())
+    }
+
+    fn read_vertices(&mut self, element: &Element, n: u64, target: &mut SurfaceSink) -> Result<()> {
+        let axis =
+            |p: &Property| ["x", "y", "z"].iter().position(|a| p.count.is_none() && *a == p.name);
+        let axes: Vec<Option<usize>> = element.properties.iter().map(axis).collect();
+        if (0..3).any(|a| axes.iter().filter(|x| **x == Some(a)).count() != 1) {
+            return Err(self.feed.unexpected("vertex properties x, y and z", b"others"));
+        }
+        for i in 0..n {
+            self.feed.need_record("vertices", n, i)?;
+            let mut p = [0.0; 3];
+            for (property, axis) in element.properties.iter().zip(&axes) {
+                match axis {
+                    Some(a) => {
+                        let x = self.scalar(property.value)?;
+                        p[*a] = self.feed.checked(x)?;
+                    }
+                    None => self.skip(property)?,
                 }
-                None => skip(feed, encoding, property)?,
             }
+            self.feed.placed(target.builder.vertex(Point::from_array(p)))?;
         }
-        feed.placed(target.builder.vertex(Point::from_array(p)))?;
+        Ok(())
     }
-    Ok(())
-}
 
-fn read_faces<R: BufRead>(
-    feed: &mut Feed<R>,
-    encoding: Encoding,
-    element: &Element,
-    n: u64,
-    n_vertices: i64,
-    target: &mut SurfaceSink,
-) -> Result<()> {
-    let is_corners = |p: &Property| {
-        p.count.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index")
-    };
-    if n > 0 && element.properties.iter().filter(|p| is_corners(p)).count() != 1 {
-        return Err(feed.unexpected("a face property `vertex_indices`", b"none"));
-    }
-    let n_vertices = u64::try_from(n_vertices).unwrap_or(0);
-    let label = target.label("");
-    let mut corners = Vec::new();
-    for i in 0..n {
-        if encoding == Encoding::Text && feed.at_end()? {
-            return Err(feed.too_few("faces", n, i));
+    fn read_faces(
+        &mut self,
+        element: &Element,
+        n: u64,
+        n_vertices: i64,
+        target: &mut SurfaceSink,
+    ) -> Result<()> {
+        let is_corners = |p: &Property| {
+            p.count.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index")
+        };
+        if n > 0 && element.properties.iter().filter(|p| is_corners(p)).count() != 1 {
+            return Err(self.feed.unexpected("a face property `vertex_indices`", b"none"));
         }
-        for property in &element.properties {
-            let Some(count) = property.count.filter(|_| is_corners(property)) else {
-                skip(feed, encoding, property)?;
-                continue;
-            };
-            let len = list_len(feed, encoding, count, property.value)?;
-            if len < 3 {
-                return Err(
-                    feed.unexpected("a face of at least 3 corners", len.to_string().as_bytes())
-                );
+        let n_vertices = u64::try_from(n_vertices).unwrap_or(0);
+        let label = target.label("");
+        let mut corners = Vec::new();
+        for i in 0..n {
+            self.feed.need_record("faces", n, i)?;
+            for property in &element.properties {
+                let Some(count) = property.count.filter(|_| is_corners(property)) else {
+                    self.skip(property)?;
+                    continue;
+                };
+                let len = self.list_len(count, property.value)?;
+                if len < 3 {
+                    return Err(self
+                        .feed
+                        .unexpected("a face of at least 3 corners", len.to_string().as_bytes()));
+                }
+                corners.clear();
+                for _ in 0..len {
+                    let index = self.integer(property.value)?;
+                    corners.push(self.feed.check_index(index, 0, n_vertices)?);
+                }
             }
-            corners.clear();
-            for _ in 0..len {
-                let index = integer(feed, encoding, property.value)?;
-                corners.push(feed.check_index(index, 0, n_vertices)?);
-            }
+            self.feed.placed(target.builder.polygon(&corners, label))?;
         }
-        feed.placed(target.builder.polygon(&corners, label))?;
+        Ok(())
     }
-    Ok(())
 }

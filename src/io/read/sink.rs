@@ -1,11 +1,11 @@
-//! Where readers put triangles.
+//! The target of readers of triangles.
 
 use std::collections::BTreeMap;
 
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceBuilder, VolumePoints};
 
-/// What the readers share: the surface being built and how this file's labels are called.
+/// The surface being built, and the naming of the current file's labels.
 pub struct SurfaceSink<'a> {
     pub(super) builder: &'a mut SurfaceBuilder,
     /// The file's name without folder and extension: the label of triangles that have none.
@@ -26,7 +26,7 @@ impl SurfaceSink<'_> {
         }
     }
 
-    /// The region around `point` is called `name`.
+    /// Names the region around `point`.
     pub(super) fn region(&mut self, point: Point, name: &str) {
         let name = match &self.prefix {
             None => name.to_owned(),
@@ -36,14 +36,14 @@ impl SurfaceSink<'_> {
         self.builder.seed(Seed { point, kind });
     }
 
-    /// Notes that so many points mark holes or regions.
+    /// Notes the number of points that mark holes or regions.
     pub(super) fn note_points(&mut self, points: VolumePoints, n: u64) {
         if n > 0 {
             self.builder.note(NoteKind::VolumePoints { points, n });
         }
     }
 
-    /// The regions of a mesh of tetrahedra: the middle of one tetrahedron of each, and what it is called.
+    /// Names the regions of a mesh of tetrahedra, each at the centroid of one of its tetrahedra.
     pub(super) fn regions_of_mesh(&mut self, first: &BTreeMap<String, Vec<[u32; 4]>>) {
         let mut n = 0;
         for (name, tets) in first {

@@ -2,12 +2,12 @@
 //!
 //! Binary: an 80-byte header of no meaning, a u32 count n, then n records of 50 bytes: normal, three
 //! corners (f32 each, little-endian), two spare bytes. So a file of 84 + 50 n bytes is binary, whatever
-//! its header says. Normals are not read: the corner order tells the side.
+//! its header says. Normals are not read: the order of corners gives the side.
 
 use std::io::BufRead;
 
 use super::feed::{self, Feed};
-use super::{ReadError, Result, SurfaceSink};
+use super::{ReadError, ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
 
@@ -31,28 +31,24 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Resul
 }
 
 fn wrong_length<R: BufRead>(mut feed: Feed<R>, n_head: usize, n: u32, expected: u64) -> ReadError {
-    feed.binary = true;
+    feed.at.is_binary = true;
     let found = format!("{} bytes", feed.len);
     if n_head < HEADER {
         let expected = format!("`solid`, or {HEADER} bytes of binary header");
-        return ReadError::Truncated { place: feed.place(), expected, found };
+        return feed.refuse(ReadFault::Truncated { expected, found });
     }
     if feed.len < expected {
-        feed.offset = feed.len;
+        feed.at.offset = feed.len;
         let expected = format!("{expected} bytes for the {n} triangles declared at byte 80");
-        return ReadError::Truncated { place: feed.place(), expected, found };
+        return feed.refuse(ReadFault::Truncated { expected, found });
     }
-    feed.offset = 80;
-    ReadError::CountMismatch {
-        place: feed.place(),
-        what: "triangles",
-        declared: format!("{n} ({expected} bytes)"),
-        found: format!("the file has {found}"),
-    }
+    feed.at.offset = 80;
+    let declared = format!("{n} ({expected} bytes)");
+    feed.miscounted("triangles", declared, format!("the file has {found}"))
 }
 
 fn read_binary<R: BufRead>(mut feed: Feed<R>, n: u32, target: &mut SurfaceSink) -> Result<()> {
-    feed.binary = true;
+    feed.at.is_binary = true;
     feed.skip_bytes(HEADER as u64)?;
     let label = target.label("");
     for _ in 0..n {
@@ -96,14 +92,14 @@ fn read_text<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<
             if is(feed.word(), "facet") {
                 read_facet(&mut feed, label, target)?;
                 if !feed.next_word()? {
-                    target.builder.note(NoteKind::MissingEndsolid { line: feed.line });
+                    target.builder.note(NoteKind::MissingEndsolid { line: feed.at.line });
                     break;
                 }
             } else if is(feed.word(), "endsolid") {
                 feed.skip_line()?;
                 break;
             } else if is(feed.word(), "solid") {
-                target.builder.note(NoteKind::MissingEndsolid { line: feed.line });
+                target.builder.note(NoteKind::MissingEndsolid { line: feed.at.line });
                 pending = true;
                 break;
             } else {

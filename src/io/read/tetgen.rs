@@ -1,21 +1,20 @@
 //! TetGen `.smesh` and `.poly`, with the points in the file or in the `.node` file beside it.
 //!
-//! Each polygon is taken for itself and fanned; a facet of several polygons or with holes is noted,
-//! and overlapping polygons are found by validation. Points that mark holes and regions of the volume become seeds; a region is called
-//! `attribute_N` after its attribute.
+//! Each polygon is fanned on its own. A facet of several polygons or with holes is noted, and overlapping polygons are found by validation.
+//! Points that mark holes and regions of the volume become seeds; a region gets the name `attribute_N` of its attribute.
 
 use std::io::BufRead;
 use std::path::Path;
 
+use super::embedded_sink::EmbeddedSink;
 use super::feed::{Feed, name, parse};
-use super::wire_sink::WireSink;
-use super::{ReadError, Result, SurfaceSink, open};
+use super::{ReadFault, Result, SurfaceSink, open};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceError, VolumePoints};
 
 /// The two layouts of the facet part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum FacetLayout {
     /// One polygon per facet, the boundary marker after it.
     Smesh,
     /// Facets of several polygons and holes, the marker before them.
@@ -31,7 +30,7 @@ struct Numbering {
 
 pub(super) fn read<R: BufRead>(
     mut feed: Feed<R>,
-    kind: Kind,
+    kind: FacetLayout,
     nodes: Option<&Path>,
     limit: u64,
     target: &mut SurfaceSink,
@@ -45,16 +44,14 @@ pub(super) fn read<R: BufRead>(
     feed.skip_line()?;
     let mut n_split = 0;
     for i in 0..n_facets {
-        if feed.at_end()? {
-            return Err(feed.too_few("facets", n_facets, i));
-        }
+        feed.need_record("facets", n_facets, i)?;
         match kind {
-            Kind::Smesh => {
+            FacetLayout::Smesh => {
                 let corners = read_polygon(&mut feed, numbering)?;
                 let marker = rest_of_line(&mut feed)?.pop().unwrap_or(0);
                 add(&feed, &corners, marker, target)?;
             }
-            Kind::Poly => n_split += u64::from(read_facet(&mut feed, numbering, target)?),
+            FacetLayout::Poly => n_split += u64::from(read_facet(&mut feed, numbering, target)?),
         }
     }
     if n_split > 0 {
@@ -78,9 +75,7 @@ fn read_volume_points<R: BufRead>(
     let n = u64::try_from(feed.integer("the number of points in the volume")?).unwrap_or(0);
     feed.skip_line()?;
     for i in 0..n {
-        if feed.at_end()? {
-            return Err(feed.too_few("points in the volume", n, i));
-        }
+        feed.need_record("points in the volume", n, i)?;
         let _: i64 = feed.integer("the number of a point in the volume")?;
         let point = feed.point()?;
         match points {
@@ -125,7 +120,7 @@ fn surface_points<R: BufRead>(
 }
 
 /// The points of a `.node` file, called by their markers.
-pub(super) fn read_nodes<R: BufRead>(feed: &mut Feed<R>, sink: &mut WireSink) -> Result<()> {
+pub(super) fn read_nodes<R: BufRead>(feed: &mut Feed<R>, sink: &mut EmbeddedSink) -> Result<()> {
     feed.comment = Some(b'#');
     let numbering = read_points(feed, |p, marker| {
         let label = sink.label(&marker_name(marker));
@@ -143,7 +138,7 @@ pub(super) fn read_segments<R: BufRead>(
     mut feed: Feed<R>,
     nodes: &Path,
     limit: u64,
-    sink: &mut WireSink,
+    sink: &mut EmbeddedSink,
 ) -> Result<()> {
     feed.comment = Some(b'#');
     let mut add = |p, _| sink.point(p);
@@ -159,9 +154,7 @@ pub(super) fn read_segments<R: BufRead>(
     let n_facets = feed.count("facets", 4)?;
     feed.skip_line()?;
     for i in 0..n_facets {
-        if feed.at_end()? {
-            return Err(feed.too_few("facets", n_facets, i));
-        }
+        feed.need_record("facets", n_facets, i)?;
         let n_polygons = feed.count("polygons", 4)?;
         let rest = rest_of_line(&mut feed)?;
         let label = marker_name(rest.get(1).copied().unwrap_or(0));
@@ -182,7 +175,7 @@ pub(super) fn read_segments<R: BufRead>(
     Ok(())
 }
 
-/// What a marker is called; zero stands for none.
+/// The label of a marker; empty for zero, which stands for none.
 fn marker_name(marker: i64) -> String {
     match marker {
         0 => String::new(),
@@ -190,7 +183,7 @@ fn marker_name(marker: i64) -> String {
     }
 }
 
-/// The point part, each with its marker or 0; `None` when it says that the points are elsewhere.
+/// Calls `each` with every point and its marker or 0; returns `None` when the points are in another file.
 fn read_points<R: BufRead>(
     feed: &mut Feed<R>,
     mut each: impl FnMut(Point, i64) -> std::result::Result<(), SurfaceError>,
@@ -231,7 +224,7 @@ fn read_points<R: BufRead>(
         }
         let p = feed.point()?;
         let mut marker = 0;
-        // The line ends the search: what the head says of attributes may be anything.
+        // The end of the line ends the search, because the head may declare any number of attributes.
         for place in 0..=place_of_marker.unwrap_or(0) {
             if !feed.next_word_in_line()? {
                 break;
@@ -288,9 +281,7 @@ fn read_facet<R: BufRead>(
     let (n_holes, marker) = (rest.first().copied().unwrap_or(0), rest.get(1).copied().unwrap_or(0));
     let n_holes = feed.check_count("holes of a facet", n_holes, 6)?;
     for i in 0..n_polygons {
-        if feed.at_end()? {
-            return Err(feed.too_few("polygons", n_polygons, i));
-        }
+        feed.need_record("polygons", n_polygons, i)?;
         let corners = read_polygon(feed, numbering)?;
         rest_of_line(feed)?;
         add(feed, &corners, marker, target)?;
@@ -302,12 +293,8 @@ fn read_facet<R: BufRead>(
         feed.skip_line()?;
     }
     if n_polygons == 0 {
-        let place = feed.place();
-        return Err(ReadError::Unexpected {
-            place,
-            expected: "at least one polygon".to_owned(),
-            found: "none".to_owned(),
-        });
+        let (expected, found) = ("at least one polygon".to_owned(), "none".to_owned());
+        return Err(feed.refuse(ReadFault::Unexpected { expected, found }));
     }
     Ok(n_polygons > 1 || n_holes > 0)
 }

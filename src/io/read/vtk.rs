@@ -5,8 +5,8 @@
 use std::io::BufRead;
 
 use super::ReadError;
+use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::feed::{Feed, Result};
-use super::wire_sink::{WireKind, WireSink};
 use tetdb_base::geom::Point;
 
 /// Kinds of cells with one vertex or several, and lines of two or more.
@@ -27,7 +27,11 @@ struct Vtk<R> {
 }
 
 /// Reads the lines or the vertices among the cells.
-pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSink) -> Result<()> {
+pub(super) fn read<R: BufRead>(
+    feed: Feed<R>,
+    kind: WireKind,
+    sink: &mut EmbeddedSink,
+) -> Result<()> {
     let mut vtk = Vtk { feed, is_binary: false, n_points: 0 };
     let mut line = Vec::new();
     vtk.feed.read_line(&mut line)?;
@@ -67,7 +71,7 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSin
                     }
                 }
             }
-            // What follows are values at points and cells.
+            // Values at points and cells follow.
             b"POINT_DATA" | b"CELL_DATA" | b"FIELD" => break,
             word => {
                 return Err(vtk.feed.unexpected("POINTS, LINES, VERTICES or CELLS", word));
@@ -82,7 +86,7 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSin
 }
 
 impl<R: BufRead> Vtk<R> {
-    /// From here on numbers follow: binary ones begin behind the end of the line.
+    /// Begins a list of numbers: binary ones begin after the end of the line.
     fn begin_data(&mut self) -> Result<()> {
         if self.is_binary {
             self.feed.skip_line()?;
@@ -106,7 +110,7 @@ impl<R: BufRead> Vtk<R> {
         }
     }
 
-    fn points(&mut self, sink: &mut WireSink) -> Result<()> {
+    fn points(&mut self, sink: &mut EmbeddedSink) -> Result<()> {
         self.n_points = self.feed.count("points", 6)?;
         self.feed.need_word("the type of coordinates")?;
         let kind = self.feed.word().to_vec();
@@ -126,7 +130,7 @@ impl<R: BufRead> Vtk<R> {
     }
 
     /// Cells: each with its number of vertices before them, or, since version 5.1, offsets and then all vertices.
-    fn cells(&mut self, sink: &WireSink) -> Result<Cells> {
+    fn cells(&mut self, sink: &EmbeddedSink) -> Result<Cells> {
         let n = self.feed.integer("the number of cells")?;
         let size = self.feed.integer("how many numbers follow")?;
         let n = self.feed.check_count("cells", n, 1)?;
@@ -175,13 +179,7 @@ impl<R: BufRead> Vtk<R> {
     }
 
     fn too_many(&self, size: u64) -> ReadError {
-        let found = "the cells need others";
-        ReadError::CountMismatch {
-            place: self.feed.place(),
-            what: "numbers of cells",
-            declared: size.to_string(),
-            found: found.to_owned(),
-        }
+        self.feed.miscounted("numbers of cells", size, "the cells need others")
     }
 
     /// Up to the empty line that ends it.

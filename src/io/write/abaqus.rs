@@ -1,25 +1,26 @@
-//! Abaqus input: C3D4 elements, or C3D10 with the middles of edges, an element set per region, a surface and a node set per label.
+//! Abaqus input: C3D4 elements, or C3D10 with the midpoints of edges, an element set per region, a surface and a node set per label.
 //!
 //! Source: the Abaqus keywords reference; faces of C3D4 are S1 = 1 2 3, S2 = 1 4 2, S3 = 2 4 3, S4 = 3 4 1.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::Result;
-use super::merged::{Merged, Tet};
+use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::names::set_names;
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
+use tetdb_store::sealed::{FaceJoin, FaceJoinSorter};
 
 /// The element's face opposite each of its nodes.
 const SIDE_OPPOSITE: [u8; 4] = [3, 4, 2, 1];
-/// Most numbers of a line of a set.
+/// Greatest number of numbers in a line of a set.
 const PER_LINE: usize = 16;
 
 sort_record! {
-    /// A number and the set that has it.
+    /// A member of a set.
     struct Member {
         set: u32,
         number: u64,
@@ -28,7 +29,7 @@ sort_record! {
 
 sort_record! {
     /// A face of an element in the surface of a label.
-    struct Side {
+    struct ElementSide {
         label: u32,
         element: u64,
         /// The element's name of the face.
@@ -36,54 +37,41 @@ sort_record! {
     }
 }
 
-sort_record! {
-    /// A boundary face by its tetrahedron.
-    struct TetFace {
-        tet: u64,
-        label: u32,
-        vertices: [u64; 3],
-    }
-}
-
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    middles: Option<&Midpoints>,
+    midpoints: Option<&Midpoints>,
 ) -> Result<()> {
     mesh.check_limits(out, i32::MAX as u64)?;
     mesh.expect_passes(1, 1);
     let digits = u64::from(mesh.n_vertices().max(1).ilog10());
-    let n_middles = middles.map_or(0, Midpoints::n);
-    let numbers = if n_middles > 0 { 11 } else { 5 };
-    let bytes = 60 * (mesh.n_vertices() + n_middles) + numbers * (digits + 2) * mesh.n_tets();
-    let path = draft.create(out, bytes)?;
+    let n_midpoints = midpoints.map_or(0, Midpoints::n);
+    let numbers = if n_midpoints > 0 { 11 } else { 5 };
+    let bytes = 60 * (mesh.n_vertices() + n_midpoints) + numbers * (digits + 2) * mesh.n_tets();
+    let path = outputs.create(out, bytes)?;
     let mut stream = Stream::open(&path)?;
     stream.text("*HEADING\nexported by tetdb\n*NODE, NSET=all_nodes\n");
-    let mut put = |number: u64, [x, y, z]: [f64; 3]| {
+    let mut put = |number: u64, point: [f64; 3]| {
         stream.integer(number + 1, b',');
-        stream.double(x, b',');
-        stream.double(y, b',');
-        stream.double(z, b'\n');
+        stream.doubles(point, b',', b'\n');
         stream.end()
     };
     mesh.vertices(|number, vertex| put(number, vertex.point))?;
-    if let Some(middles) = middles {
-        let (mut points, mut number) = (middles.points()?, mesh.n_vertices());
-        while let Some(point) = points.next()? {
-            put(number, point)?;
-            number += 1;
+    if let Some(midpoints) = midpoints {
+        for (number, point) in (mesh.n_vertices()..).zip(midpoints.points()?) {
+            put(number, point?)?;
         }
     }
     let regions = mesh.regions()?;
     let dir = mesh.dir().to_owned();
     let regions = regions.iter().map(|&r| (r, mesh.region_name(r)));
     let regions = set_names(&regions.collect());
-    let sides = elements(mesh, &dir, &mut stream, &regions, middles)?;
+    let sides = elements(mesh, &dir, &mut stream, &regions, midpoints)?;
     let names = set_names(&mesh.labels());
     surfaces(sides, &names, &mut stream)?;
-    node_sets(mesh, &dir, &names, &mut stream, middles)?;
-    wires(mesh, &mut stream);
+    node_sets(mesh, &dir, &names, &mut stream, midpoints)?;
+    embedded(mesh, &mut stream);
     stream.finish()
 }
 
@@ -93,9 +81,9 @@ fn elements(
     dir: &Path,
     stream: &mut Stream,
     regions: &BTreeMap<u32, String>,
-    middles: Option<&Midpoints>,
-) -> Result<Sorted<Side>> {
-    let kind = if middles.is_some() { "C3D10" } else { "C3D4" };
+    midpoints: Option<&Midpoints>,
+) -> Result<Sorted<ElementSide>> {
+    let kind = if midpoints.is_some() { "C3D10" } else { "C3D4" };
     // With one region its set is named with the elements, else sets follow.
     match regions.values().next() {
         Some(name) if regions.len() == 1 => {
@@ -105,17 +93,18 @@ fn elements(
     }
     let mut by_region = Sorter::new(dir, mesh.sorter_bytes() / 2);
     let mut sides = Sorter::new(dir, mesh.sorter_bytes() / 2);
-    let mut faces = faces_by_tet(mesh, dir)?.peekable();
+    let mut faces = faces_by_tet(mesh, dir)?;
     let mut number = 0u64;
-    let first_middle = mesh.n_vertices() + 1;
-    let mut edges = middles.map(Midpoints::tets).transpose()?;
+    let first_midpoint = mesh.n_vertices() + 1;
+    let mut edges = midpoints.map(Midpoints::tets).transpose()?;
     mesh.tets(|tet| {
-        while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, |f| f.tet <= number)) {
-            let face = face?;
-            sides.push(Side {
-                label: face.label,
+        while let Some(face) = faces.next_below(number as u32 + 1)? {
+            let outside = |v: &u64| !face.vertices.contains(&(*v as u32));
+            let opposite = tet.nodes.iter().position(outside).unwrap_or(0);
+            sides.push(ElementSide {
+                label: face.mark,
                 element: number + 1,
-                side: SIDE_OPPOSITE[opposite(tet, &face)],
+                side: SIDE_OPPOSITE[opposite],
             })?;
         }
         number += 1;
@@ -123,17 +112,11 @@ fn elements(
             let set = tet.region;
             by_region.push(Member { set, number })?;
         }
-        let [a, b, c, d] = tet.nodes.map(|v| v + 1);
+        let edges = edges.as_mut().map(|edges| edges.next()).transpose()?;
+        let midpoints = edges.into_iter().flatten().map(|edge| first_midpoint + edge);
+        let nodes = tet.nodes.into_iter().map(|v| v + 1).chain(midpoints);
         stream.integer(number, b',');
-        stream.integer(a, b',');
-        stream.integer(b, b',');
-        stream.integer(c, b',');
-        stream.integer(d, if middles.is_some() { b',' } else { b'\n' });
-        if let Some(edges) = &mut edges {
-            for (i, edge) in edges.next()?.into_iter().enumerate() {
-                stream.integer(first_middle + edge, if i < 5 { b',' } else { b'\n' });
-            }
-        }
+        stream.integers(nodes, b',', b'\n');
         stream.end()
     })?;
     let head = |region: u32| format!("*ELSET, ELSET={}\n", regions[&region]);
@@ -142,20 +125,20 @@ fn elements(
 }
 
 /// Embedded edges as sets of T3D2 elements, points as sets of nodes.
-fn wires(mesh: &Merged, stream: &mut Stream) {
-    let wires = mesh.wires();
-    let labels = wires.edge_labels().into_iter().chain(wires.point_labels());
+fn embedded(mesh: &Merged, stream: &mut Stream) {
+    let embedded = mesh.embedded();
+    let labels = embedded.edge_labels().into_iter().chain(embedded.point_labels());
     let names = labels.map(|(label, _)| (label, mesh.label_name(label)));
     let names = set_names(&names.collect());
     let mut last = None;
-    for (number, ([a, b], label)) in (mesh.n_tets() + 1..).zip(&wires.edges) {
+    for (number, ([a, b], label)) in (mesh.n_tets() + 1..).zip(&embedded.edges) {
         if last.replace(label) != Some(label) {
             stream.text(&format!("*ELEMENT, TYPE=T3D2, ELSET=edges_{}\n", names[label]));
         }
         stream.text(&format!("{number},{},{}\n", a + 1, b + 1));
     }
     let mut last = None;
-    for point in &wires.points {
+    for point in &embedded.points {
         if last.replace(point.label) != Some(point.label) {
             stream.text(&format!("*NSET, NSET=points_{}\n", names[&point.label]));
         }
@@ -163,19 +146,14 @@ fn wires(mesh: &Merged, stream: &mut Stream) {
     }
 }
 
-/// The boundary faces, by tetrahedron.
-fn faces_by_tet(mesh: &Merged, dir: &Path) -> Result<Sorted<TetFace>> {
-    let mut sorter = Sorter::new(dir, mesh.sorter_bytes());
+/// The boundary faces by tetrahedron, marked by their labels. All numbers have 31 bits.
+fn faces_by_tet(mesh: &Merged, dir: &Path) -> Result<FaceJoin> {
+    let mut sorter = FaceJoinSorter::new(dir, mesh.sorter_bytes());
     mesh.faces().each(|face| {
-        Ok(sorter.push(TetFace { tet: face.tet, label: face.label, vertices: face.vertices })?)
+        let vertices = face.vertices.map(|v| v as u32);
+        Ok(sorter.push(face.tet as u32, vertices, false, face.label)?)
     })?;
     Ok(sorter.finish()?)
-}
-
-/// The node of `tet` that is not in `face`.
-fn opposite(tet: &Tet, face: &TetFace) -> usize {
-    let outside = |v: &u64| !face.vertices.contains(v);
-    tet.nodes.iter().position(outside).unwrap_or(0)
 }
 
 /// Writes sorted members as sets, each after its head; equal records count once.
@@ -210,7 +188,11 @@ fn sets(sorted: Sorted<Member>, head: impl Fn(u32) -> String, stream: &mut Strea
     Ok(())
 }
 
-fn surfaces(sides: Sorted<Side>, names: &BTreeMap<u32, String>, stream: &mut Stream) -> Result<()> {
+fn surfaces(
+    sides: Sorted<ElementSide>,
+    names: &BTreeMap<u32, String>,
+    stream: &mut Stream,
+) -> Result<()> {
     let mut last = None;
     for side in sides {
         let side = side?;
@@ -230,10 +212,10 @@ fn node_sets(
     dir: &Path,
     names: &BTreeMap<u32, String>,
     stream: &mut Stream,
-    middles: Option<&Midpoints>,
+    midpoints: Option<&Midpoints>,
 ) -> Result<()> {
     let mut sorter = Sorter::new(dir, mesh.sorter_bytes());
-    let mut edges = middles.map(Midpoints::faces).transpose()?;
+    let mut edges = midpoints.map(Midpoints::faces).transpose()?;
     mesh.faces().each(|face| {
         for v in face.vertices {
             let (set, number) = (face.label, v + 1);

@@ -1,34 +1,34 @@
-//! One file of a mesh in the format asked for.
+//! One file of a mesh in the requested format.
 
 use std::path::Path;
 
-use super::draft::Draft;
+use super::embedded_list::write_list;
 use super::error::Result;
 use super::format::MeshFormat;
 use super::merged::Merged;
 use super::midpoints::Midpoints;
+use super::output_files::OutputFiles;
 use super::report::FileCounts;
-use super::selection::{Content, Order, Selection};
-use super::wires_list::write_list;
+use super::selection::{Content, ElementOrder, ExportSelection};
 use super::writers::{Writers, is_first};
-use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtu, vtu_boundary};
+use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtk};
 
-/// Writes a mesh as one file, and what belongs to it; the tetrahedra of `.vtkhdf` as one of several `writers`, of whom the first does the rest.
+/// Writes a mesh as one file with its side files. Several `writers` may share the tetrahedra of `.vtkhdf`; the first writes the rest.
 pub(super) fn write(
     format: MeshFormat,
-    selection: &Selection,
+    selection: &ExportSelection,
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
     writers: Option<&dyn Writers>,
 ) -> Result<FileCounts> {
-    let middles = match selection.order {
-        Order::First => None,
-        Order::Second => Some(Midpoints::gather(mesh, format == MeshFormat::Gmsh)?),
+    let midpoints = match selection.order {
+        ElementOrder::First => None,
+        ElementOrder::Second => Some(Midpoints::gather(mesh, format == MeshFormat::Gmsh)?),
     };
-    let middles = middles.as_ref();
+    let midpoints = midpoints.as_ref();
     let mut counts = FileCounts {
-        vertices: mesh.n_vertices() + middles.map_or(0, Midpoints::n),
+        vertices: mesh.n_vertices() + midpoints.map_or(0, Midpoints::n),
         tets: mesh.n_tets(),
         triangles: mesh.n_faces(),
     };
@@ -36,27 +36,29 @@ pub(super) fn write(
         MeshFormat::Vtu | MeshFormat::VtkHdf if selection.content != Content::Mesh => {
             mesh.expect_passes(1, 0);
             let is_hdf = format == MeshFormat::VtkHdf;
-            counts.vertices = vtu_boundary::write(mesh, draft, out, is_hdf, middles)?;
+            counts.vertices = vtk::write_boundary(mesh, outputs, out, is_hdf, midpoints)?;
             counts.tets = 0;
         }
-        MeshFormat::Vtu | MeshFormat::Pvtu => vtu::write(mesh, draft, out, false, middles, None)?,
+        MeshFormat::Vtu | MeshFormat::Pvtu => {
+            vtk::write(mesh, outputs, out, false, midpoints, None)?
+        }
         MeshFormat::VtkHdf => {
-            vtu::write(mesh, draft, out, true, middles, writers)?;
+            vtk::write(mesh, outputs, out, true, midpoints, writers)?;
             if !is_first(writers) {
                 return Ok(FileCounts::default());
             }
         }
-        MeshFormat::Medit => medit::write_text(mesh, draft, out)?,
-        MeshFormat::MeditBinary => medit::write_binary(mesh, draft, out)?,
-        MeshFormat::Gmsh => counts = gmsh::write(mesh, draft, out, (selection, middles))?,
-        MeshFormat::Gmsh22 => gmsh22::write(mesh, draft, out)?,
-        MeshFormat::Abaqus => abaqus::write(mesh, draft, out, middles)?,
-        MeshFormat::Numpy => npy_columns::write(mesh, draft, out)?,
+        MeshFormat::Medit => medit::write_text(mesh, outputs, out)?,
+        MeshFormat::MeditBinary => medit::write_binary(mesh, outputs, out)?,
+        MeshFormat::Gmsh => counts = gmsh::write(mesh, outputs, out, (selection, midpoints))?,
+        MeshFormat::Gmsh22 => gmsh22::write(mesh, outputs, out)?,
+        MeshFormat::Abaqus => abaqus::write(mesh, outputs, out, midpoints)?,
+        MeshFormat::Numpy => npy_columns::write(mesh, outputs, out)?,
         #[cfg(feature = "parquet")]
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),
-        MeshFormat::OpenFoam => counts = foam::write(mesh, draft, out, selection)?,
-        MeshFormat::Mfem => counts = mfem::write(mesh, draft, out, selection)?,
-        MeshFormat::TetGen => tetgen::write(mesh, draft, out)?,
+        MeshFormat::OpenFoam => counts = foam::write(mesh, outputs, out, selection)?,
+        MeshFormat::Mfem => counts = mfem::write(mesh, outputs, out, selection)?,
+        MeshFormat::TetGen => tetgen::write(mesh, outputs, out)?,
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }
     let has_lines = matches!(
@@ -69,7 +71,7 @@ pub(super) fn write(
             | MeshFormat::TetGen
     );
     if !has_lines && selection.content == Content::Mesh {
-        write_list(mesh, draft, out)?;
+        write_list(mesh, outputs, out)?;
     }
     mesh.report_end();
     Ok(counts)

@@ -1,10 +1,10 @@
-//! Vertices that stand twice or more often, once for each side of the sheets they are on.
+//! Doubles of vertices on sheets: one vertex for each side of the sheets it is on.
 
 use std::path::PathBuf;
 
 use super::error::Result;
-use super::stream::Records;
-use tetdb_base::storage::{Payload, SortRecord, sort_record};
+use super::stream::RecordReader;
+use tetdb_base::storage::{Payload, sort_record};
 use tetdb_schema::record::SealedVertex;
 
 sort_record! {
@@ -28,10 +28,7 @@ sort_record! {
     }
 }
 
-const CHANGE_BYTES: usize = size_of::<<Change as SortRecord>::Bytes>();
-const DOUBLE_BYTES: usize = size_of::<<Double as SortRecord>::Bytes>();
-
-/// All of them, in scratch files.
+/// All doubles, in scratch files.
 pub(super) struct Doubles {
     pub n: u64,
     /// Changes by tetrahedron, and doubles.
@@ -40,48 +37,44 @@ pub(super) struct Doubles {
 }
 
 /// Changes, read one tetrahedron after the other.
-pub(super) struct Changes {
-    records: Records<CHANGE_BYTES>,
+pub(super) struct ChangeReader {
+    records: RecordReader<Change>,
     next: Option<Change>,
 }
 
 impl Doubles {
-    pub fn changes(&self) -> Result<Changes> {
-        let mut records = Records::open(&self.changes, 0)?;
-        let next = records.next()?;
-        let next = next.map(|bytes| Change::from_bytes(&bytes));
-        Ok(Changes { records, next })
+    /// The changes, from the first one on. Errors: the disk.
+    pub fn changes(&self) -> Result<ChangeReader> {
+        let mut records = RecordReader::open(&self.changes, 0)?;
+        Ok(ChangeReader { next: records.next()?, records })
     }
 
     /// Every double with its place among them. Errors: the disk, those of `each`.
     pub fn each(&self, mut each: impl FnMut(u64, &Double) -> Result<()>) -> Result<()> {
-        let mut records = Records::<DOUBLE_BYTES>::open(&self.vertices, 0)?;
         let mut place = 0;
-        while let Some(bytes) = records.next()? {
-            each(place, &Double::from_bytes(&bytes))?;
+        RecordReader::open(&self.vertices, 0)?.each(|double| {
             place += 1;
-        }
-        Ok(())
+            each(place - 1, double)
+        })
     }
 }
 
-impl Changes {
-    /// The vertices of tetrahedron `tet`, which follows those asked for before.
+impl ChangeReader {
+    /// Puts doubles into the vertices of tetrahedron `tet`, which is later than those of earlier calls. Errors: the disk.
     pub fn apply(&mut self, tet: u64, nodes: &mut [u64; 4]) -> Result<()> {
         while let Some(change) = self.next.filter(|change| change.tet <= tet) {
             if change.tet == tet {
                 let node = nodes.iter_mut().find(|node| **node == change.vertex);
                 node.into_iter().for_each(|node| *node = change.double);
             }
-            let next = self.records.next()?;
-            self.next = next.map(|bytes| Change::from_bytes(&bytes));
+            self.next = self.records.next()?;
         }
         Ok(())
     }
 }
 
 impl Double {
-    /// What it says as a vertex: all but its number is that of the one it is of.
+    /// The double as a vertex: equal to the original but for its number.
     pub fn sealed(&self) -> SealedVertex {
         SealedVertex { point: self.point.0, h: self.h as f32, tag: self.tag, id: self.id }
     }

@@ -1,4 +1,4 @@
-//! Why a file could not be written.
+//! Errors of writing.
 
 use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
@@ -21,14 +21,14 @@ pub enum WriteError {
         /// The known endings.
         known: &'static str,
     },
-    /// The format has no place for what was asked for.
+    /// The format lacks a requested ability.
     #[error("{path}: the format {format} holds no {what}")]
     Unsupported {
         /// The file to be written.
         path: PathBuf,
         /// The format.
         format: &'static str,
-        /// What it cannot hold.
+        /// Name of the ability.
         what: String,
     },
     /// The format has only single precision, the surface needs double.
@@ -44,19 +44,19 @@ pub enum WriteError {
     TooLarge {
         /// The file to be written.
         path: PathBuf,
-        /// What is counted.
+        /// Name of the counted things.
         what: &'static str,
         /// The most the format holds.
         limit: u64,
-        /// How many there are.
+        /// Their number.
         found: u64,
     },
-    /// Such tetrahedra are not there.
+    /// The region has no tetrahedra.
     #[error("no region {region} is filled, {}", among(filled))]
     NoRegion {
-        /// Its number.
+        /// Number of the region.
         region: u32,
-        /// Numbers of those that are.
+        /// Numbers of the filled regions.
         filled: Vec<u32>,
     },
     /// The file will not fit. Units: bytes.
@@ -75,14 +75,14 @@ pub enum WriteError {
         /// The file to be written.
         path: PathBuf,
     },
-    /// The standard output took no more.
+    /// The standard output accepts no more bytes.
     #[error(
         "the mesh could not be written to the standard output: {source}; of it {written} bytes were"
     )]
     StandardOutput {
-        /// Bytes that it took.
+        /// Bytes written before.
         written: u64,
-        /// What the operating system said.
+        /// The error of the operating system.
         #[source]
         source: std::io::Error,
     },
@@ -91,7 +91,7 @@ pub enum WriteError {
     Io {
         /// The file to be written.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         #[source]
         source: std::io::Error,
     },
@@ -123,7 +123,7 @@ impl WriteError {
         }
     }
 
-    /// The file it is about, unless it is about the store, whose errors name their file.
+    /// The file of the error; errors of the store name their file themselves.
     pub fn place(&self) -> Option<&Path> {
         match self {
             Self::UnknownFormat { path, .. }
@@ -138,13 +138,13 @@ impl WriteError {
         }
     }
 
-    /// What to do about it.
+    /// Advice for the user.
     pub fn help(&self) -> &'static str {
         match self {
             Self::UnknownFormat { .. } => "end the name with one of those that are expected",
             Self::Unsupported { .. } => "choose another format, or leave that option out",
             Self::Lossy { .. } => "choose .ply, .obj, .off or .stl (text), which keep doubles",
-            Self::NoRegion { .. } => "choose one of those that `tetdb info` lists as filled",
+            Self::NoRegion { .. } => "choose one of the store's filled regions",
             Self::TooLarge { .. } => "export to .vtu or .meshb, whose numbers have 64 bits",
             Self::NoSpace { .. } | Self::DiskFull { .. } => {
                 "free some space, or export to another disk; compare with `df -h`"
@@ -172,7 +172,7 @@ impl WriteError {
     }
 }
 
-/// Numbers as a sentence's end.
+/// The filled regions as the end of a sentence.
 fn among(filled: &[u32]) -> String {
     match filled {
         [] => "none at all is".to_owned(),
@@ -225,5 +225,5 @@ impl From<SealedError> for WriteError {
     }
 }
 
-/// What writers return.
+/// Result of all writers.
 pub(super) type Result<T> = std::result::Result<T, WriteError>;

@@ -1,4 +1,4 @@
-//! Boundary faces of what is written: input triangles in the order of the input, then faces shared with other sub-domains.
+//! Boundary faces of the written mesh: input triangles in the order of the input, then faces shared with other sub-domains.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,23 +8,23 @@ use tetdb_schema::record::{InterfaceFace, NO_TET, SealedFacet};
 use super::error::Result;
 use super::numbering::PartNumbers;
 use super::scope::Scope;
-use super::stream::{Records, Stream, scratch};
-use tetdb_base::storage::{SortRecord, Sorter, sort_record};
+use super::stream::{RecordReader, Stream, scratch};
+use tetdb_base::storage::{Sorter, sort_record};
 
-/// Marks the key of an interface face, and sorts it behind the input triangles; below it the number of the cut, then of the face.
+/// Bit in the key of an interface face, which sorts it after the input triangles; below it are the numbers of cut and face.
 const INTERFACE: u64 = 1 << 63;
 
 sort_record! {
     /// A boundary face in the merged mesh.
-    pub(super) struct Face {
+    pub(super) struct MergedFace {
         /// Number of the input triangle, or an interface face's cut and number in it.
         key: u64,
-        /// On the side that is left out when both sides are written.
+        /// True for the side that is left out when both sides are written.
         is_second: bool,
         /// Numbers of its vertices: in the input's order, or counter-clockwise seen from the other sub-domain.
         pub vertices: [u64; 3],
         pub label: u32,
-        /// Of an input triangle: in front (where the normal points to) and behind; 0 is empty, and stands for unknown at an interface.
+        /// Regions in front of an input triangle, where the normal points to, and behind it; 0 is empty. Both are 0 at an interface.
         pub regions: [u32; 2],
         /// The sub-domain of its tetrahedron.
         pub subdomain: u32,
@@ -35,23 +35,20 @@ sort_record! {
     }
 }
 
-/// Bytes of a face in the scratch file.
-const BYTES: usize = size_of::<<Face as SortRecord>::Bytes>();
-
-impl Face {
-    /// Its number in the input.
+impl MergedFace {
+    /// Number of the triangle in the input; `None` for an interface face.
     pub fn triangle(&self) -> Option<u64> {
         (self.key < INTERFACE).then_some(self.key)
     }
 
-    /// The cut an interface face is of, and its number there.
+    /// Cut of an interface face, and its number in the cut; `None` for an input triangle.
     pub fn cut(&self) -> Option<(u32, u32)> {
         let key = self.key.checked_sub(INTERFACE)?;
         Some(((key >> 32) as u32, key as u32))
     }
 }
 
-/// The sub-domain whose faces are collected, with what the merged mesh knows of it.
+/// The sub-domain whose faces are collected, with its numbers in the merged mesh.
 pub(super) struct FaceSource<'a> {
     pub rank: u32,
     pub numbers: &'a PartNumbers,
@@ -60,7 +57,7 @@ pub(super) struct FaceSource<'a> {
 
 /// Collects faces of one sub-domain after the other.
 pub(super) struct FaceSorter {
-    sorter: Sorter<Face>,
+    sorter: Sorter<MergedFace>,
     path: PathBuf,
 }
 
@@ -72,8 +69,8 @@ impl FaceSorter {
 
     /// Adds a facet of a sub-domain.
     ///
-    /// A triangle between two sub-domains is in both: the one with its filled side, or with its front when both sides are
-    /// filled, counts, unless it is not written. Errors: the disk.
+    /// A triangle between two sub-domains is in both. The sub-domain on its filled side counts, or on its front when both sides are filled,
+    /// unless that sub-domain is not written. Errors: the disk.
     pub fn push(&mut self, f: &SealedFacet, part: &FaceSource) -> Result<()> {
         let regions = f.regions.map(|region| part.scope.region(region));
         let preferred = usize::from(regions[0] == 0);
@@ -85,10 +82,10 @@ impl FaceSorter {
         let Some((side, tet)) = sides.filter_map(|side| Some((side, tet_of(side)?))).next() else {
             return Ok(());
         };
-        let face = Face {
+        let face = MergedFace {
             key: f.triangle,
             is_second: side != preferred,
-            vertices: part.numbers.of(f.vertices)?,
+            vertices: part.numbers.vertices(f.vertices)?,
             label: f.label,
             regions,
             tet,
@@ -108,10 +105,10 @@ impl FaceSorter {
         let Some(tet) = part.numbers.tet(f.tet) else {
             return Ok(());
         };
-        let face = Face {
+        let face = MergedFace {
             key: INTERFACE | u64::from(f.cut) << 32 | u64::from(f.index),
             is_second: false,
-            vertices: part.numbers.of(f.vertices)?,
+            vertices: part.numbers.vertices(f.vertices)?,
             label,
             regions: [0, 0],
             tet,
@@ -122,7 +119,7 @@ impl FaceSorter {
     }
 
     /// Ends collecting. Errors: the disk.
-    pub fn finish(self) -> Result<Faces> {
+    pub fn finish(self) -> Result<MergedFaces> {
         let mut file = FaceFile::create(self.path)?;
         let mut last = None;
         for face in self.sorter.finish()? {
@@ -137,7 +134,7 @@ impl FaceSorter {
 
 /// Faces being written to their scratch file.
 struct FaceFile {
-    faces: Faces,
+    faces: MergedFaces,
     stream: Stream,
 }
 
@@ -145,46 +142,41 @@ impl FaceFile {
     fn create(path: PathBuf) -> Result<Self> {
         let stream = scratch(&path)?;
         let (n, labels) = (0, BTreeMap::new());
-        let faces = Faces { n, labels, path };
+        let faces = MergedFaces { n, labels, path };
         Ok(Self { faces, stream })
     }
 
-    fn put(&mut self, face: &Face) -> Result<()> {
+    fn put(&mut self, face: &MergedFace) -> Result<()> {
         self.faces.n += 1;
         *self.faces.labels.entry(face.label).or_default() += 1;
-        self.stream.bytes(&face.to_bytes());
-        self.stream.end()
+        self.stream.record(face)
     }
 
-    fn finish(self) -> Result<Faces> {
+    fn finish(self) -> Result<MergedFaces> {
         self.stream.finish()?;
         Ok(self.faces)
     }
 }
 
 /// All boundary faces, in a scratch file.
-pub(super) struct Faces {
+pub(super) struct MergedFaces {
     pub n: u64,
-    /// How many faces each label has.
+    /// Number of faces of each label.
     pub labels: BTreeMap<u32, u64>,
     path: PathBuf,
 }
 
-impl Faces {
+impl MergedFaces {
     /// Every face, input triangles first. Errors: the disk, and those of `each`.
-    pub fn each(&self, mut each: impl FnMut(&Face) -> Result<()>) -> Result<()> {
-        let mut records = Records::<BYTES>::open(&self.path, 0)?;
-        while let Some(record) = records.next()? {
-            each(&Face::from_bytes(&record))?;
-        }
-        Ok(())
+    pub fn each(&self, each: impl FnMut(&MergedFace) -> Result<()>) -> Result<()> {
+        RecordReader::open(&self.path, 0)?.each(each)
     }
 
-    /// The faces that `each` puts for these, at `path`. Errors: the disk, those of `each`.
+    /// Replaces the faces by those that `each` puts, saved at `path`. Errors: the disk, those of `each`.
     pub fn rewritten(
         &self,
         path: &Path,
-        mut each: impl FnMut(&Face, &mut dyn FnMut(&Face) -> Result<()>) -> Result<()>,
+        mut each: impl FnMut(&MergedFace, &mut dyn FnMut(&MergedFace) -> Result<()>) -> Result<()>,
     ) -> Result<Self> {
         let mut file = FaceFile::create(path.to_owned())?;
         self.each(|face| each(face, &mut |face| file.put(face)))?;

@@ -33,11 +33,11 @@ pub enum MeshFormat {
     /// Apache Parquet: of each sub-domain the tetrahedra `NAME_00007.parquet` and the vertices `NAME_00007_vertices.parquet`.
     #[cfg(feature = "parquet")]
     Parquet,
-    /// JSON: who neighbors whom, and the vertices and faces that each two sub-domains share.
+    /// JSON: the neighbors of each sub-domain, and the vertices and faces that each two sub-domains share.
     Topology,
 }
 
-/// Something that can be asked of a format: a bit, and what one holds no.
+/// An ability of some formats: its bit, and its name in messages.
 #[derive(Clone, Copy)]
 pub(super) struct Ability(u16, &'static str);
 
@@ -52,7 +52,7 @@ pub(super) const STREAM: Ability = Ability(128, "stream that is written from beg
 
 pub(super) const SLITS: Ability = Ability(256, "split sheets");
 
-/// All formats: the word, which is also the ending of names but for `msh22`, and what each can.
+/// All formats: the word, which is also the ending of names except for `msh22`, and the abilities.
 const FORMATS: &[(&str, MeshFormat, u16)] = {
     use MeshFormat::*;
     const PARTS: u16 = SUBDOMAINS.0 | REGIONS.0 | REGIONS_APART.0;
@@ -78,13 +78,13 @@ const FORMATS: &[(&str, MeshFormat, u16)] = {
 };
 
 impl MeshFormat {
-    /// The format a file name's extension tells.
-    pub fn of_extension(path: &Path) -> Option<Self> {
-        Self::of_word(&path.extension()?.to_str()?.to_ascii_lowercase())
+    /// The format of a file name's extension.
+    pub fn from_extension(path: &Path) -> Option<Self> {
+        Self::from_word(&path.extension()?.to_str()?.to_ascii_lowercase())
     }
 
     /// The format of this word: an ending without its dot, or `msh22`.
-    pub fn of_word(word: &str) -> Option<Self> {
+    pub fn from_word(word: &str) -> Option<Self> {
         let row = FORMATS.iter().find(|row| row.0 == word)?;
         Some(row.1)
     }
@@ -110,7 +110,7 @@ impl MeshFormat {
         Some(format!("{noun}; these do: {}", words.join(", ")))
     }
 
-    /// Whether pieces in it carry numbers in the whole, so that all of it is open while they are written.
+    /// Returns whether pieces of the format have numbers of the whole, so that the whole is open while they are written.
     pub fn numbers_globally(self) -> bool {
         matches!(self, Self::OpenFoam | Self::Gmsh | Self::Mfem)
     }

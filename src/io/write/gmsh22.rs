@@ -1,14 +1,15 @@
 //! Gmsh 2.2, binary: physical surfaces are labels, physical volumes regions.
 //!
 //! Physical and elementary tags are the same: label + 1 on triangles, the region on tetrahedra.
-//! Elements are numbered from 1, triangles first. Of several sub-domains each is a partition, numbered from 1. Source: the Gmsh reference manual, "MSH file format version 2".
+//! Elements are numbered from 1, triangles first. Where there are several sub-domains, each is a partition, numbered from 1.
+//! Source: the Gmsh reference manual, "MSH file format version 2".
 
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::Result;
+use super::gmsh;
 use super::merged::Merged;
-use super::names::quotable;
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 
 /// Gmsh's numbers of the types of elements.
@@ -16,11 +17,11 @@ const LINE: u32 = 1;
 const POINT: u32 = 15;
 const TRIANGLE: u32 = 2;
 const TETRAHEDRON: u32 = 4;
-/// Tags of an element: physical, elementary; of several sub-domains also the number of its partitions, 1, and the partition.
+/// Tags of an element: physical and elementary; in a mesh of several sub-domains also the number of its partitions, 1, and the partition.
 const N_TAGS: u32 = 2;
 const N_TAGS_PARTITIONED: u32 = 4;
 
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     mesh.check_limits(out, i32::MAX as u64)?;
     mesh.expect_passes(1, 1);
     let elements_bytes = 24 * mesh.n_faces() + 28 * mesh.n_tets();
@@ -28,7 +29,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     let partitioned = if mesh.n_parts() > 1 { partition_bytes } else { 0 };
     let bytes = 200 + 28 * mesh.n_vertices() + elements_bytes + partitioned;
     let names = physical_names(mesh)?;
-    let path = draft.create(out, bytes + names.len() as u64)?;
+    let path = outputs.create(out, bytes + names.len() as u64)?;
     let mut stream = Stream::open(&path)?;
     stream.text("$MeshFormat\n2.2 1 8\n");
     put(&mut stream, &[1]);
@@ -43,9 +44,9 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         stream.end()
     })?;
     let (n_faces, n_tets) = (mesh.n_faces(), mesh.n_tets());
-    let wires = mesh.wires();
-    let n_wires = (wires.edges.len() + wires.points.len()) as u64;
-    let n = n_faces + n_tets + n_wires;
+    let embedded = mesh.embedded();
+    let n_embedded = (embedded.edges.len() + embedded.points.len()) as u64;
+    let n = n_faces + n_tets + n_embedded;
     stream.text(&format!("\n$EndNodes\n$Elements\n{n}\n"));
     elements(mesh, &mut stream)?;
     stream.text("\n$EndElements\n");
@@ -86,20 +87,20 @@ fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
             stream.end()
         })?;
     }
-    // Of several sub-domains they are said to be of the first: the format wants one.
-    let wires = mesh.wires();
-    if !wires.edges.is_empty() {
-        put(stream, &[LINE, wires.edges.len() as u32, n_tags]);
-        for (ends, label) in &wires.edges {
+    // Edges and points are put into the first partition, because the format needs one.
+    let embedded = mesh.embedded();
+    if !embedded.edges.is_empty() {
+        put(stream, &[LINE, embedded.edges.len() as u32, n_tags]);
+        for (ends, label) in &embedded.edges {
             number += 1;
             put_head(stream, number, label + 1, 0);
             put(stream, &ends.map(|v| v as u32 + 1));
             stream.end()?;
         }
     }
-    if !wires.points.is_empty() {
-        put(stream, &[POINT, wires.points.len() as u32, n_tags]);
-        for (place, point) in (1u32..).zip(&wires.points) {
+    if !embedded.points.is_empty() {
+        put(stream, &[POINT, embedded.points.len() as u32, n_tags]);
+        for (place, point) in (1u32..).zip(&embedded.points) {
             number += 1;
             put(stream, &[number, point.label + 1, place]);
             if partitioned {
@@ -114,23 +115,8 @@ fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
 
 /// The section that names labels (dimension 2) and regions (dimension 3).
 fn physical_names(mesh: &mut Merged) -> Result<String> {
-    let labels = mesh.labels();
     let regions = mesh.regions()?;
-    let points = mesh.wires().point_labels().into_keys().map(|l| (0, l));
-    let edges = mesh.wires().edge_labels().into_keys().map(|l| (1, l));
-    let wires: Vec<(u32, u32)> = points.chain(edges).collect();
-    let n = wires.len() + labels.len() + regions.len();
-    let mut text = format!("$PhysicalNames\n{n}\n");
-    for (dim, label) in wires {
-        let name = mesh.label_name(label);
-        text += &format!("{dim} {} \"{}\"\n", label + 1, quotable(&name));
-    }
-    for (label, name) in labels {
-        text += &format!("2 {} \"{}\"\n", label + 1, quotable(&name));
-    }
-    for region in regions {
-        let name = quotable(&mesh.region_name(region));
-        text += &format!("3 {region} \"{name}\"\n");
-    }
-    Ok(text + "$EndPhysicalNames\n")
+    let labels = mesh.labels().into_keys();
+    let names = gmsh::physical_names(mesh, mesh.embedded(), labels, regions);
+    Ok(format!("$PhysicalNames\n{names}$EndPhysicalNames\n"))
 }

@@ -1,27 +1,12 @@
-//! HDF5 files whose arrays are all known ahead: groups, attributes, and arrays in one run each, filled afterwards in any order.
+//! HDF5 files whose arrays are known in advance: groups, attributes, and contiguous arrays that are filled afterwards in any order.
 //!
-//! Is not a general writer: no chunks, no compression, names in ASCII, and the links of a group in its own header. That is what lets a file
-//! of any size be laid out before its first byte and be written by nobody but the operating system.
+//! Is not a general writer: no chunks, no compression, names in ASCII, and the links of a group in its own header. So a file of any size is laid
+//! out before its first byte is written.
 //! Source: the HDF5 file format specification, version 3.0 (superblock 2, object headers 2); the checksum is Jenkins's `lookup3`.
 
-/// What an array's numbers are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Number {
-    U8,
-    U32,
-    I64,
-    F64,
-}
+use super::columns::Number;
 
 impl Number {
-    pub fn bytes(self) -> u64 {
-        match self {
-            Self::U8 => 1,
-            Self::U32 => 4,
-            Self::I64 | Self::F64 => 8,
-        }
-    }
-
     /// The message that describes it.
     fn datatype(self) -> Vec<u8> {
         let size = self.bytes() as u8;
@@ -30,7 +15,10 @@ impl Number {
             // Class 1, implied leading bit, sign in bit 63.
             Self::F64 => vec![0x11, 0x20, 63, 0, size, 0, 0, 0],
             // Class 0; bit 3 of the second byte is the sign.
-            _ => vec![0x10, 8 * u8::from(self == Self::I64), 0, 0, size, 0, 0, 0],
+            _ => {
+                let sign = 8 * u8::from(matches!(self, Self::I32 | Self::I64));
+                vec![0x10, sign, 0, 0, size, 0, 0, 0]
+            }
         };
         message.extend(precision);
         if self == Self::F64 {
@@ -43,14 +31,14 @@ impl Number {
 }
 
 /// A node of the file's tree.
-pub(super) struct Object {
+pub(super) struct Hdf5Object {
     name: &'static str,
-    attributes: Vec<Attribute>,
+    attributes: Vec<Hdf5Attribute>,
     content: Content,
 }
 
 /// A small value attached to an object.
-struct Attribute {
+struct Hdf5Attribute {
     name: &'static str,
     datatype: Vec<u8>,
     dataspace: Vec<u8>,
@@ -58,12 +46,12 @@ struct Attribute {
 }
 
 enum Content {
-    Group(Vec<Object>),
+    Group(Vec<Hdf5Object>),
     Array(Number, Vec<u64>),
 }
 
-impl Object {
-    pub fn group(name: &'static str, children: Vec<Object>) -> Self {
+impl Hdf5Object {
+    pub fn group(name: &'static str, children: Vec<Hdf5Object>) -> Self {
         let (attributes, content) = (Vec::new(), Content::Group(children));
         Self { name, attributes, content }
     }
@@ -74,9 +62,9 @@ impl Object {
         Self { name, attributes, content }
     }
 
-    /// The same with a list of integers attached.
+    /// Attaches a list of integers.
     pub fn with_integers(mut self, name: &'static str, values: &[i64]) -> Self {
-        self.attributes.push(Attribute {
+        self.attributes.push(Hdf5Attribute {
             name,
             datatype: Number::I64.datatype(),
             dataspace: dataspace(&[values.len() as u64]),
@@ -85,11 +73,11 @@ impl Object {
         self
     }
 
-    /// The same with a text of ASCII attached.
+    /// Attaches a text of ASCII.
     pub fn with_text(mut self, name: &'static str, text: &str) -> Self {
         let mut datatype = vec![0x13, 0, 0, 0];
         datatype.extend((text.len() as u32).to_le_bytes());
-        self.attributes.push(Attribute {
+        self.attributes.push(Hdf5Attribute {
             name,
             datatype,
             dataspace: vec![2, 0, 0, 0],
@@ -106,7 +94,7 @@ fn dataspace(shape: &[u64]) -> Vec<u8> {
 }
 
 /// The beginning of the file, and where its arrays are.
-pub(super) struct Plan {
+pub(super) struct Hdf5Layout {
     pub head: Vec<u8>,
     /// First byte and length of each array, in the order of the tree.
     pub arrays: Vec<[u64; 2]>,
@@ -118,14 +106,15 @@ const SUPERBLOCK_BYTES: usize = 48;
 const UNDEFINED: u64 = u64::MAX;
 
 /// Lays out a file with this root.
-pub(super) fn plan(root: &Object) -> Plan {
+pub(super) fn plan(root: &Hdf5Object) -> Hdf5Layout {
     // Headers have the same length whatever the addresses in them: the first round measures them.
     let measured = round(root, 0).head.len() as u64;
     round(root, measured)
 }
 
-fn round(root: &Object, data: u64) -> Plan {
-    let mut plan = Plan { head: vec![0; SUPERBLOCK_BYTES], arrays: Vec::new(), file_bytes: data };
+fn round(root: &Hdf5Object, data: u64) -> Hdf5Layout {
+    let mut plan =
+        Hdf5Layout { head: vec![0; SUPERBLOCK_BYTES], arrays: Vec::new(), file_bytes: data };
     let root = put_object(root, &mut plan);
     let mut superblock = b"\x89HDF\r\n\x1a\n\x02\x08\x08\x00".to_vec();
     for address in [0, UNDEFINED, plan.file_bytes, root] {
@@ -137,7 +126,7 @@ fn round(root: &Object, data: u64) -> Plan {
 }
 
 /// Adds an object's header behind those of its children; returns its address.
-fn put_object(object: &Object, plan: &mut Plan) -> u64 {
+fn put_object(object: &Hdf5Object, plan: &mut Hdf5Layout) -> u64 {
     let mut messages = Vec::new();
     let mut message = |kind: u8, data: &[u8]| {
         messages.push(kind);
@@ -250,12 +239,12 @@ mod tests {
 
     #[test]
     fn arrays_follow_the_headers_and_do_not_overlap() {
-        let root = Object::group(
+        let root = Hdf5Object::group(
             "",
             vec![
-                Object::array("a", Number::U8, &[3]).with_text("kind", "x"),
-                Object::group("g", vec![Object::array("b", Number::F64, &[5, 3])]),
-                Object::array("c", Number::I64, &[0]),
+                Hdf5Object::array("a", Number::U8, &[3]).with_text("kind", "x"),
+                Hdf5Object::group("g", vec![Hdf5Object::array("b", Number::F64, &[5, 3])]),
+                Hdf5Object::array("c", Number::I64, &[0]),
             ],
         );
         let plan = plan(&root);

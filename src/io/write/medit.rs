@@ -4,9 +4,9 @@
 
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 
 /// Least bytes of a line with three doubles; few of them are shorter than fifteen digits.
@@ -31,9 +31,9 @@ trait Medit {
     fn listed(&mut self, vertex: u64) -> Result<()>;
 }
 
-struct Text(Stream);
+struct TextMedit(Stream);
 
-impl Medit for Text {
+impl Medit for TextMedit {
     fn section(&mut self, keyword: (&str, u32), n: u64, _: u64) {
         self.0.text(&format!("\n{}\n{n}\n", keyword.0));
     }
@@ -60,10 +60,10 @@ impl Medit for Text {
     }
 }
 
-/// Binary, and the position reached: each section tells where the next one begins.
-struct Binary(Stream, u64);
+/// A binary file, and the position reached: each section has the position of the next one.
+struct BinaryMedit(Stream, u64);
 
-impl Medit for Binary {
+impl Medit for BinaryMedit {
     fn section(&mut self, keyword: (&str, u32), n: u64, bytes: u64) {
         self.1 += 4 + 8 + 8 + n * bytes;
         self.0.bytes(&keyword.1.to_le_bytes());
@@ -95,7 +95,7 @@ impl Medit for Binary {
 
 /// The reference of an embedded point is its label + 1, that of other vertices 0.
 fn vertices(mesh: &mut Merged, file: &mut impl Medit) -> Result<()> {
-    let points = mesh.wires().points.iter();
+    let points = mesh.embedded().points.iter();
     let mut points: Vec<(u64, u32)> = points.map(|p| (p.vertex, p.label)).collect();
     points.sort_unstable();
     let mut points = points.into_iter().peekable();
@@ -107,17 +107,17 @@ fn vertices(mesh: &mut Merged, file: &mut impl Medit) -> Result<()> {
     })
 }
 
-fn wires(mesh: &Merged, file: &mut impl Medit) -> Result<()> {
-    let wires = mesh.wires();
-    if !wires.edges.is_empty() {
-        file.section(EDGES, wires.edges.len() as u64, 24);
-        for (ends, label) in &wires.edges {
+fn embedded(mesh: &Merged, file: &mut impl Medit) -> Result<()> {
+    let embedded = mesh.embedded();
+    if !embedded.edges.is_empty() {
+        file.section(EDGES, embedded.edges.len() as u64, 24);
+        for (ends, label) in &embedded.edges {
             file.element(ends, u64::from(*label) + 1)?;
         }
     }
-    if !wires.points.is_empty() {
-        file.section(REQUIRED_VERTICES, wires.points.len() as u64, 8);
-        for point in &wires.points {
+    if !embedded.points.is_empty() {
+        file.section(REQUIRED_VERTICES, embedded.points.len() as u64, 8);
+        for point in &embedded.points {
             file.listed(point.vertex)?;
         }
     }
@@ -127,29 +127,29 @@ fn wires(mesh: &Merged, file: &mut impl Medit) -> Result<()> {
 fn sections(mesh: &mut Merged, file: &mut impl Medit) -> Result<()> {
     mesh.expect_passes(1, 1);
     vertices(mesh, file)?;
-    wires(mesh, file)?;
+    embedded(mesh, file)?;
     file.section(TRIANGLES, mesh.n_faces(), 32);
     mesh.faces().each(|face| file.element(&face.vertices, u64::from(face.label) + 1))?;
     file.section(TETRAHEDRA, mesh.n_tets(), 40);
     mesh.tets(|tet| file.element(&tet.nodes, u64::from(tet.region)))
 }
 
-pub(super) fn write_text(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+pub(super) fn write_text(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     let digits = u64::from(mesh.n_vertices().max(1).ilog10());
     let (faces, tets) = (mesh.n_faces(), mesh.n_tets());
     let bytes =
         VERTEX_BYTES_LEAST * mesh.n_vertices() + (3 * digits + 5) * faces + (4 * digits + 6) * tets;
-    let path = draft.create(out, bytes)?;
-    let mut file = Text(Stream::open(&path)?);
+    let path = outputs.create(out, bytes)?;
+    let mut file = TextMedit(Stream::open(&path)?);
     file.0.text("MeshVersionFormatted 2\n\nDimension 3\n");
     sections(mesh, &mut file)?;
     file.0.text("\nEnd\n");
     file.0.finish()
 }
 
-pub(super) fn write_binary(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+pub(super) fn write_binary(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     let bytes = 100 + 32 * (mesh.n_vertices() + mesh.n_faces()) + 40 * mesh.n_tets();
-    let path = draft.create(out, bytes)?;
+    let path = outputs.create(out, bytes)?;
     let mut stream = Stream::open(&path)?;
     // Byte order, version, then the dimension as a section without a count.
     for value in [1u32, 4, DIMENSION] {
@@ -158,7 +158,7 @@ pub(super) fn write_binary(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> 
     let begin: u64 = 8 + 16;
     stream.bytes(&begin.to_le_bytes());
     stream.bytes(&3u32.to_le_bytes());
-    let mut file = Binary(stream, begin);
+    let mut file = BinaryMedit(stream, begin);
     sections(mesh, &mut file)?;
     file.0.bytes(&END.to_le_bytes());
     file.0.bytes(&0u64.to_le_bytes());

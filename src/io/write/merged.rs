@@ -8,35 +8,33 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
-use super::chosen::Chosen;
 use super::doubles::Doubles;
+use super::embedded::{WrittenEmbedded, memory_left};
 use super::error::{Result, WriteError};
-use super::faces::{Face, FaceSorter, FaceSource, Faces};
-use super::numbering::{Numbering, PartNumbers, Sharer, Source, candidates, sharers};
-use super::on_surface::OnSurface;
+use super::faces::{FaceSorter, FaceSource, MergedFace, MergedFaces};
+use super::merged_parts::{collect_faces, misplaced, required_faces, sources};
+use super::numbering::{Numbering, PartNumbers, Sharer, Source, shareable_vertices, sharers};
 use super::scope::{FaceSet, Scope};
-use super::wires::{WrittenWires, beside};
 use tetdb_base::shape::excess_near;
 use tetdb_base::storage::{Sorted, check_cancelled};
 use tetdb_schema::catalog::SubdomainRow;
-use tetdb_store::sealed::SealedError;
-use tetdb_store::sealed::{Shape, Subdomain};
-use tetdb_store::store::{Catalog, StoreError};
+use tetdb_store::sealed::{SealedError, Shape, Subdomain};
+use tetdb_store::store::Catalog;
 
-/// Counts records and tells.
-pub(super) struct Progress<'a> {
+/// Counts records and reports progress.
+pub(super) struct ReadProgress<'a> {
     report: &'a dyn Fn(u64, u64),
     done: Cell<u64>,
     total: Cell<u64>,
 }
 
-impl<'a> Progress<'a> {
+impl<'a> ReadProgress<'a> {
     pub fn new(report: &'a dyn Fn(u64, u64)) -> Self {
         let (done, total) = (Cell::new(0), Cell::new(0));
         Self { report, done, total }
     }
 
-    /// Counts `n` more records; the place where a request to stop is heard.
+    /// Counts `n` more records; unwinds when the run is cancelled.
     fn advance(&self, n: usize) {
         check_cancelled();
         let done = self.done.get() + n as u64;
@@ -46,26 +44,26 @@ impl<'a> Progress<'a> {
 }
 
 /// A tetrahedron of the merged mesh.
-pub(super) struct Tet {
+pub(super) struct MergedTet {
     /// Numbers of its vertices; positive volume in this order.
     pub nodes: [u64; 4],
     pub region: u32,
     pub subdomain: u32,
-    /// Its name for ever.
+    /// Lasting id.
     pub id: TetId,
-    /// NaN in a pass that does not ask for it.
+    /// NaN in a pass that does not measure it.
     pub quality: f64,
-    /// Its quality over the least that its faces on the surface allow; NaN in a pass that does not ask for it.
+    /// Quality over the least quality that the tetrahedron's faces on the surface allow; NaN in a pass that does not measure it.
     pub excess: f64,
 }
 
-/// What is computed of tetrahedra in a pass.
+/// Measures of tetrahedra in a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Measured {
     Nothing,
-    /// [`Tet::quality`].
+    /// [`MergedTet::quality`].
     Quality,
-    /// This and [`Tet::excess`].
+    /// [`MergedTet::quality`] and [`MergedTet::excess`].
     Excess,
 }
 
@@ -73,15 +71,15 @@ pub(super) enum Measured {
 #[derive(Clone, Copy)]
 pub(super) struct Part {
     pub rank: u32,
-    /// Number of the first vertex that it numbers.
+    /// Number of the first vertex that the sub-domain numbers.
     pub first_vertex: u64,
-    /// Vertices that it has.
+    /// Vertices of the sub-domain.
     pub n_vertices: u64,
     pub n_tets: u64,
 }
 
 /// A sub-domain being read, and its numbers in the merged mesh.
-pub(super) struct Opened {
+pub(super) struct OpenedPart {
     pub part: Subdomain,
     pub numbers: PartNumbers,
 }
@@ -94,15 +92,15 @@ pub(super) struct Merged<'a> {
     parts: Vec<Source>,
     regions: BTreeSet<u32>,
     numbering: Numbering,
-    faces: Faces,
+    faces: MergedFaces,
     doubles: Option<Doubles>,
-    wires: WrittenWires,
-    fin_first: u64,
+    embedded: WrittenEmbedded,
+    support_first: u64,
     label_names: Vec<String>,
     region_names: Vec<String>,
     dir: PathBuf,
     memory: usize,
-    progress: Progress<'a>,
+    progress: ReadProgress<'a>,
     /// Sub-domains whose vertices and tetrahedra are read, by place.
     window: Range<usize>,
 }
@@ -116,15 +114,15 @@ impl<'a> Merged<'a> {
         scope: Scope,
         dir: &Path,
         memory: usize,
-        progress: Progress<'a>,
+        progress: ReadProgress<'a>,
     ) -> Result<Self> {
         let (label_names, region_names) = (store.labels()?, store.region_names()?);
         let row = store.wires()?;
-        let memory = beside(&row, memory)?;
+        let memory = memory_left(&row, memory)?;
         let parts = sources(store, scope, dir, memory)?;
         let numbering = Numbering::new(store, &parts, scope.apart, dir, memory)?;
         let first_label = label_names.len() as u32;
-        let mut wires = WrittenWires::gather(store, &row, (&parts, &numbering), memory)?;
+        let mut embedded = WrittenEmbedded::gather(store, &row, (&parts, &numbering), memory)?;
         let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
         let with_faces = scope.faces != FaceSet::Nothing;
         for (p, source) in parts.iter().enumerate().filter(|_| with_faces) {
@@ -144,34 +142,34 @@ impl<'a> Merged<'a> {
             numbering,
             faces,
             doubles: None,
-            wires: WrittenWires::default(),
-            fin_first: row.fin_first,
+            embedded: WrittenEmbedded::default(),
+            support_first: row.fin_first,
             label_names,
             region_names,
             dir: dir.to_owned(),
             memory,
             progress,
         };
-        if !wires.edges.is_empty() && !is_whole {
-            let mut edges = wires.edges_to_find();
+        if !embedded.edges.is_empty() && !is_whole {
+            let mut edges = embedded.edges_to_find();
             mesh.tets(|tet| {
                 edges.find(tet.nodes);
                 Ok(())
             })?;
-            wires.keep_found(&edges);
+            embedded.keep_found(&edges);
         }
-        mesh.wires = wires;
+        mesh.embedded = embedded;
         Ok(mesh)
     }
 
-    /// Embedded edges and points that are in it.
-    pub fn wires(&self) -> &WrittenWires {
-        &self.wires
+    /// The written embedded edges and points.
+    pub fn embedded(&self) -> &WrittenEmbedded {
+        &self.embedded
     }
 
-    /// Facets from this number on are no triangles of the input: each holds an embedded edge.
-    pub fn fin_first(&self) -> u64 {
-        self.fin_first
+    /// Number of the first support triangle: facets from here on hold embedded edges and are no input triangles.
+    pub fn support_first(&self) -> u64 {
+        self.support_first
     }
 
     /// Vertices and their doubles.
@@ -179,15 +177,15 @@ impl<'a> Merged<'a> {
         self.numbering.n_vertices() + self.doubles.as_ref().map_or(0, |doubles| doubles.n)
     }
 
-    /// From now on vertices stand as often as this says.
+    /// Adds doubles of vertices to all later passes.
     pub fn set_doubles(&mut self, doubles: Doubles) {
         self.doubles = Some(doubles);
     }
 
-    /// Puts the faces that `each` puts in the place of the ones it gets. Errors: the disk, those of `each`.
+    /// Replaces each face by those that `each` puts for it. Errors: the disk, those of `each`.
     pub fn rewrite_faces(
         &mut self,
-        each: impl FnMut(&Face, &mut dyn FnMut(&Face) -> Result<()>) -> Result<()>,
+        each: impl FnMut(&MergedFace, &mut dyn FnMut(&MergedFace) -> Result<()>) -> Result<()>,
     ) -> Result<()> {
         self.faces = self.faces.rewritten(&self.dir.join("split-faces"), each)?;
         Ok(())
@@ -205,9 +203,9 @@ impl<'a> Merged<'a> {
     }
 
     /// Sub-domain `p`, to be read as it is. Errors: damage, the disk.
-    pub fn open_part(&mut self, p: usize) -> Result<Opened> {
+    pub fn open_part(&mut self, p: usize) -> Result<OpenedPart> {
         let rank = self.parts[p].row.rank;
-        Ok(Opened {
+        Ok(OpenedPart {
             part: self.store.open_subdomain(rank, self.memory / 4)?,
             numbers: self.numbers_of(p)?,
         })
@@ -220,7 +218,7 @@ impl<'a> Merged<'a> {
 
     /// Every vertex that several sub-domains have, by the places of these. Errors: damage, the disk.
     pub fn sharers(&mut self) -> Result<Sorted<Sharer>> {
-        let by_id = candidates(self.store, &self.parts, &self.dir, self.memory)?;
+        let by_id = shareable_vertices(self.store, &self.parts, &self.dir, self.memory)?;
         sharers(by_id, &self.dir, self.sorter_bytes())
     }
 
@@ -232,22 +230,22 @@ impl<'a> Merged<'a> {
         Ok(regions.filter(|region| self.writes(*region)).collect())
     }
 
-    /// Whether only some regions are written.
+    /// Returns whether only some regions are written.
     pub fn is_of_regions(&self) -> bool {
         !self.regions.is_empty()
     }
 
-    /// Whether the tetrahedra of a region are written.
+    /// Returns whether the tetrahedra of a region are written.
     pub fn writes(&self, region: u32) -> bool {
         self.regions.is_empty() || self.regions.contains(&region)
     }
 
-    /// How many labels the input has.
+    /// Number of labels of the input.
     pub fn n_labels(&self) -> u32 {
         self.label_names.len() as u32
     }
 
-    /// The name of a label; one that the input has not stands for the interface to a sub-domain.
+    /// The name of a label; labels beyond those of the input stand for interfaces to sub-domains.
     pub fn label_name(&self, label: u32) -> String {
         match self.label_names.get(label as usize) {
             Some(name) => name.clone(),
@@ -255,7 +253,7 @@ impl<'a> Merged<'a> {
         }
     }
 
-    /// What a region is called: its own name, or one after its number.
+    /// The name of a region, or `region_N` where it has none.
     pub fn region_name(&self, region: u32) -> String {
         let place = (region as usize).checked_sub(1);
         match place.and_then(|place| self.region_names.get(place)) {
@@ -275,22 +273,19 @@ impl<'a> Merged<'a> {
         }
     }
 
-    /// Counts records that were read past the passes, for progress.
+    /// Counts records that were read outside the passes, for progress.
     pub fn advance(&self, n: usize) {
         self.progress.advance(n);
     }
 
-    /// Refuses a mesh that has not what its records announced.
+    /// Refuses a count that differs from the announced one.
     pub fn expect_count(&self, what: &str, expected: u64, found: u64) -> Result<()> {
         if expected == found {
             return Ok(());
         }
-        Err(StoreError::Sealed(SealedError::Content {
-            path: self.store.dir().to_owned(),
-            subdomain: self.parts.first().map_or(0, |source| source.row.rank),
-            what: format!("{found} {what} where {expected} were expected"),
-        })
-        .into())
+        let rank = self.parts.first().map_or(0, |source| source.row.rank);
+        let what = format!("{found} {what} where {expected} were expected");
+        Err(SealedError::content(self.store.dir(), rank, what).into())
     }
 
     /// Number of sub-domains.
@@ -306,7 +301,7 @@ impl<'a> Merged<'a> {
         self.faces.n
     }
 
-    pub fn faces(&self) -> &Faces {
+    pub fn faces(&self) -> &MergedFaces {
         &self.faces
     }
 
@@ -326,25 +321,25 @@ impl<'a> Merged<'a> {
         self.faces.labels.keys().map(name).collect()
     }
 
-    /// Announces how many passes will come, for progress.
+    /// Announces the number of passes, for progress.
     pub fn expect_passes(&self, vertices: u64, tets: u64) {
         let all = |of: fn(&SubdomainRow) -> u64| self.parts.iter().map(|s| of(&s.row)).sum::<u64>();
         let total = vertices * all(|row| row.vertices) + tets * all(|row| row.tets);
         self.progress.total.set(total);
     }
 
-    /// From now on only the vertices and tetrahedra of some sub-domains are read; of what is counted and numbered nothing changes.
+    /// Narrows all later passes to the vertices and tetrahedra of some sub-domains; counts and numbers stay.
     pub fn look_at(&mut self, window: Range<usize>) {
         self.window = window;
     }
 
-    /// Tells that all is done.
+    /// Reports that all is done.
     pub fn report_end(&self) {
         let total = self.progress.total.get().max(self.progress.done.get());
         (self.progress.report)(total, total);
     }
 
-    /// Refuses what does not fit the format's numbers.
+    /// Refuses a mesh with more vertices or elements than `limit`.
     pub fn check_limits(&self, out: &Path, limit: u64) -> Result<()> {
         let elements = self.n_tets() + self.n_faces();
         for (what, found) in [("vertices", self.n_vertices()), ("elements", elements)] {
@@ -369,7 +364,11 @@ impl<'a> Merged<'a> {
                 let chunk = chunk?;
                 let end = u64::from(chunk.first) + chunk.records.len() as u64;
                 if end > row.vertices {
-                    return Err(too_many_vertices(self.store, row, end).into());
+                    let what = format!(
+                        "a chunk ends at vertex {end}, the catalog counts {}",
+                        row.vertices
+                    );
+                    return Err(part.damaged(what).into());
                 }
                 for (local, vertex) in (chunk.first..).zip(&chunk.records) {
                     if let Some(number) = numbers.own(local) {
@@ -387,15 +386,15 @@ impl<'a> Merged<'a> {
     }
 
     /// Every tetrahedron in the order of its number. Errors: damage, those of `each`.
-    pub fn tets(&mut self, each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
+    pub fn tets(&mut self, each: impl FnMut(&MergedTet) -> Result<()>) -> Result<()> {
         self.measured_tets(Measured::Nothing, each)
     }
 
-    /// As [`Merged::tets`], measured. Errors: the disk, too.
+    /// As [`Merged::tets`], measured. Errors: also the disk.
     pub fn measured_tets(
         &mut self,
         measured: Measured,
-        mut each: impl FnMut(&Tet) -> Result<()>,
+        mut each: impl FnMut(&MergedTet) -> Result<()>,
     ) -> Result<()> {
         let mut changes = self.doubles.as_ref().map(Doubles::changes).transpose()?;
         for p in self.window.clone() {
@@ -406,7 +405,7 @@ impl<'a> Merged<'a> {
                 Measured::Nothing | Measured::Quality => None,
                 Measured::Excess => {
                     let memory = self.memory as u64 / 8;
-                    Some(OnSurface::of_part(&mut part, &self.dir, memory)?)
+                    Some(required_faces(&mut part, &self.dir, memory)?)
                 }
             };
             let mut expected = 0;
@@ -415,7 +414,7 @@ impl<'a> Merged<'a> {
                 for (local, tet) in (chunk.first..).zip(&chunk.records) {
                     let id = TetId::new(part.id(), local)
                         .filter(|_| local == expected && u64::from(local) < row.tets);
-                    let id = id.ok_or_else(|| damaged(&part, local, expected))?;
+                    let id = id.ok_or_else(|| misplaced(&part, local, expected))?;
                     expected += 1;
                     let Some(number) = numbers.tet(local) else {
                         continue;
@@ -423,20 +422,20 @@ impl<'a> Merged<'a> {
                     let (mut quality, mut excess) = (f64::NAN, f64::NAN);
                     if measured != Measured::Nothing {
                         let points = part.corners(tet.nodes)?.map(|c| c.point);
-                        quality = Shape::of(points).quality;
+                        quality = Shape::new(points).quality;
                         if let Some(on_surface) = &mut on_surface {
-                            let faces = on_surface.faces(local, tet.nodes)?;
+                            let faces = on_surface.faces_of(local, tet.nodes)?;
                             excess = match faces.contains(&true) {
                                 true => excess_near(points, faces),
                                 false => quality,
                             };
                         }
                     }
-                    let mut nodes = numbers.of(tet.nodes)?;
+                    let mut nodes = numbers.vertices(tet.nodes)?;
                     if let Some(changes) = &mut changes {
                         changes.apply(number, &mut nodes)?;
                     }
-                    each(&Tet {
+                    each(&MergedTet {
                         nodes,
                         region: tet.region,
                         subdomain: row.rank,
@@ -448,7 +447,7 @@ impl<'a> Merged<'a> {
                 self.progress.advance(chunk.records.len());
             }
             if u64::from(expected) != row.tets {
-                return Err(damaged(&part, row.tets as u32, expected).into());
+                return Err(misplaced(&part, row.tets as u32, expected).into());
             }
         }
         Ok(())
@@ -474,66 +473,4 @@ impl<'a> Merged<'a> {
         regions.retain(|&region| self.writes(region));
         Ok(regions)
     }
-}
-
-/// The sub-domains that `scope` holds, and what of them; one of which nothing is written is left out.
-fn sources(store: &mut Catalog, scope: Scope, dir: &Path, memory: usize) -> Result<Vec<Source>> {
-    let mut sources = Vec::new();
-    for row in store.subdomains()? {
-        if !scope.holds(row.rank) {
-            continue;
-        }
-        let mut source = Source::from(row);
-        if !scope.regions.is_empty() {
-            let path = dir.join(format!("chosen-{}", source.row.rank));
-            let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
-            [source.n_tets, source.n_vertices] = Chosen::gather(&mut part, scope.regions, &path)?;
-            source.chosen = Some(path);
-        }
-        if source.n_tets > 0 || scope.regions.is_empty() {
-            sources.push(source);
-        }
-    }
-    Ok(sources)
-}
-
-fn damaged(part: &Subdomain, found: u32, expected: u32) -> StoreError {
-    StoreError::Sealed(SealedError::Content {
-        path: part.path().to_owned(),
-        subdomain: part.id().rank(),
-        what: format!("tetrahedron {found} stands where {expected} was expected"),
-    })
-}
-
-fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> StoreError {
-    StoreError::Sealed(SealedError::Content {
-        path: catalog.file_path(row.rank, row.generation).path().to_owned(),
-        subdomain: row.rank,
-        what: format!("a chunk ends at vertex {end}, the catalog counts {}", row.vertices),
-    })
-}
-
-/// Hands the faces of a sub-domain that its scope lists to `sorter`; interface faces are labelled by the sub-domain behind
-/// them, from `first_label` on; facets from `fin_first` on are no triangles of the input.
-fn collect_faces(
-    from: &mut Subdomain,
-    part: &FaceSource,
-    [first_label, fin_first]: [u64; 2],
-    sorter: &mut FaceSorter,
-) -> Result<()> {
-    if part.scope.faces != FaceSet::Interfaces {
-        for facet in from.facets() {
-            let facet = facet?;
-            if facet.triangle < fin_first {
-                sorter.push(&facet, part)?;
-            }
-        }
-    }
-    for face in from.interfaces() {
-        let face = face?;
-        if part.scope.lists(part.rank, face.other) {
-            sorter.push_interface(&face, first_label as u32 + face.other, part)?;
-        }
-    }
-    Ok(())
 }

@@ -1,27 +1,27 @@
-//! The middles of edges, for elements of second order: straight edges, each middle once, numbered by the numbers of its edge's ends.
+//! Midpoints of edges, for elements of second order: each edge has one, and the ends of the edges number them.
 //!
-//! A middle is half of one end and half of the other, so that all files that have an edge have the same bits for it.
+//! A midpoint is half of one end plus half of the other, so that it has the same bits in every file.
 
 use std::path::PathBuf;
 
 use super::error::Result;
 use super::merged::Merged;
-use super::stream::{Records, scratch};
-use tetdb_base::storage::{Payload, Sorter, StorageError, sort_record};
+use super::stream::{RecordReader, scratch};
+use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
+use tetdb_store::sealed::MergeReader;
 
-/// The edges of a tetrahedron in the order in which VTK and Abaqus have their middles, behind its corners.
+/// The edges of a tetrahedron in VTK's and Abaqus's order of midpoints.
 pub(super) const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
-/// The same of a triangle.
+/// The edges of a triangle in the same order.
 const FACE_EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [0, 2]];
-/// Begins the places of boundary faces, behind those of all tetrahedra.
+/// First place of the edges of boundary faces; those of tetrahedra come before.
 const FACE: u64 = 1 << 63;
-/// Begins the places of embedded edges, behind those.
+/// First place of the embedded edges.
 const LINE: u64 = FACE | 1 << 62;
-const POINT_BYTES: usize = 24;
 
 sort_record! {
     /// An edge of an element.
-    struct EdgeUse {
+    struct ElementEdge {
         low: u64,
         high: u64,
         /// 6 · tetrahedron + edge, or [`FACE`] and 3 · face + edge, or [`LINE`] and the edge.
@@ -30,7 +30,7 @@ sort_record! {
 }
 
 sort_record! {
-    /// An edge by its second end, with where its first one is.
+    /// An edge by its second end, with the position of its first end.
     struct HalfEdge {
         high: u64,
         edge: u64,
@@ -39,22 +39,31 @@ sort_record! {
 }
 
 sort_record! {
-    struct Middle {
+    /// The midpoint of an edge.
+    struct Midpoint {
         edge: u64,
-        point: Payload<[f64; 3]>,
+        position: Payload<[f64; 3]>,
     }
 }
 
 sort_record! {
-    struct Place {
+    /// A midpoint in the scratch file, where its place is its number.
+    struct Position {
+        position: Payload<[f64; 3]>,
+    }
+}
+
+sort_record! {
+    /// The number of an element's edge.
+    struct EdgeNumber {
         place: u64,
         edge: u64,
     }
 }
 
-/// The middles of the edges of a mesh.
+/// The midpoints of the edges of a mesh.
 pub(super) struct Midpoints {
-    /// How many edges there are whose first end each sub-domain numbers.
+    /// For each sub-domain, the number of edges whose first end it numbers.
     pub counts: Vec<u64>,
     n_tets: u64,
     n_faces: u64,
@@ -64,95 +73,25 @@ pub(super) struct Midpoints {
 }
 
 impl Midpoints {
-    /// Numbers them, in two passes over vertices and one over tetrahedra, those of embedded edges too if `has_lines`. Errors: damage, the disk.
+    /// Numbers the midpoints, in two passes over vertices and one over tetrahedra; with `has_lines` also those of embedded edges. Errors: damage, the disk.
     pub fn gather(mesh: &mut Merged, has_lines: bool) -> Result<Self> {
-        let dir = mesh.dir().to_owned();
-        let bytes = mesh.sorter_bytes();
-        let mut uses = Sorter::new(&dir, bytes);
-        let mut push = |nodes: [u64; 2], place| {
-            let [low, high] = [nodes[0].min(nodes[1]), nodes[0].max(nodes[1])];
-            uses.push(EdgeUse { low, high, place })
-        };
-        let lines = mesh.wires().edges.iter().filter(|_| has_lines);
-        for (place, (ends, _)) in (LINE..).zip(lines) {
-            push(*ends, place)?;
-        }
-        let mut place = 0;
-        mesh.tets(|tet| {
-            for edge in TET_EDGES {
-                push(edge.map(|i| tet.nodes[i]), place)?;
-                place += 1;
-            }
-            Ok(())
-        })?;
-        let mut place = FACE;
-        mesh.faces().each(|face| {
-            for edge in FACE_EDGES {
-                push(edge.map(|i| face.vertices[i]), place)?;
-                place += 1;
-            }
-            Ok(())
-        })?;
-        let mut uses = uses.finish()?.peekable();
-        let mut places = Sorter::new(&dir, bytes);
-        let mut halves = Sorter::new(&dir, bytes);
-        let firsts: Vec<u64> = mesh.parts().iter().map(|part| part.first_vertex).collect();
-        let mut counts = vec![0; firsts.len()];
-        let (mut n, mut last) = (0u64, None);
-        mesh.vertices(|number, vertex| {
-            let here = |u: &std::result::Result<EdgeUse, StorageError>| {
-                u.as_ref().map_or(true, |u| u.low == number)
-            };
-            while let Some(edge_use) = uses.next_if(here) {
-                let EdgeUse { low, high, place } = edge_use?;
-                if last.replace([low, high]) != Some([low, high]) {
-                    n += 1;
-                    counts[firsts.partition_point(|&first| first <= number) - 1] += 1;
-                    halves.push(HalfEdge {
-                        high,
-                        edge: n - 1,
-                        low_point: Payload(vertex.point),
-                    })?;
-                }
-                places.push(Place { place, edge: n - 1 })?;
-            }
-            Ok(())
-        })?;
-        let mut halves = halves.finish()?.peekable();
-        let mut middles = Sorter::new(&dir, bytes);
-        mesh.vertices(|number, vertex| {
-            let here = |h: &std::result::Result<HalfEdge, StorageError>| {
-                h.as_ref().map_or(true, |h| h.high == number)
-            };
-            while let Some(half) = halves.next_if(here) {
-                let half = half?;
-                let (a, b) = (half.low_point.0, vertex.point);
-                middles.push(Middle {
-                    edge: half.edge,
-                    point: Payload([0, 1, 2].map(|i| 0.5 * a[i] + 0.5 * b[i])),
-                })?;
-            }
-            Ok(())
-        })?;
-        let [points, elements] = ["middles", "edges"].map(|name| dir.join(name));
+        let [points, elements] = ["midpoints", "edges"].map(|name| mesh.dir().join(name));
+        let edges = element_edges(mesh, has_lines)?;
+        let (counts, halves, numbers) = numbered(mesh, edges)?;
         let mut stream = scratch(&points)?;
-        for middle in middles.finish()? {
-            for x in middle?.point.0 {
-                stream.bytes(&x.to_le_bytes());
-            }
-            stream.end()?;
+        for midpoint in positions(mesh, halves)? {
+            stream.record(&Position { position: midpoint?.position })?;
         }
         stream.finish()?;
         let mut stream = scratch(&elements)?;
-        for place in places.finish()? {
-            stream.bytes(&place?.edge.to_le_bytes());
-            stream.end()?;
+        for number in numbers {
+            stream.record(&number?.edge.to_le_bytes())?;
         }
         stream.finish()?;
         Ok(Self { counts, n_tets: mesh.n_tets(), n_faces: mesh.n_faces(), elements, points })
     }
 
-    /// How many there are.
+    /// Number of midpoints.
     pub fn n(&self) -> u64 {
         self.counts.iter().sum()
     }
@@ -162,40 +101,39 @@ impl Midpoints {
         self.counts[..p].iter().sum()
     }
 
-    /// Of each tetrahedron the numbers of its edges. Errors: the disk.
+    /// The edge numbers of each tetrahedron. Errors: the disk.
     pub fn tets(&self) -> Result<ElementEdges<6>> {
-        let records = Records::open(&self.elements, 0)?;
-        Ok(ElementEdges { records, first: 0 })
+        self.elements_from(0)
     }
 
-    /// Of each boundary face the numbers of its edges. Errors: the disk.
+    /// The edge numbers of each boundary face. Errors: the disk.
     pub fn faces(&self) -> Result<ElementEdges<3>> {
-        let first = 6 * self.n_tets;
-        let records = Records::open(&self.elements, first)?;
-        Ok(ElementEdges { records, first })
+        self.elements_from(6 * self.n_tets)
     }
 
-    /// Of each embedded edge its number. Errors: the disk.
+    /// The number of each embedded edge. Errors: the disk.
     pub fn lines(&self) -> Result<ElementEdges<1>> {
-        let first = 6 * self.n_tets + 3 * self.n_faces;
-        let records = Records::open(&self.elements, first)?;
-        Ok(ElementEdges { records, first })
+        self.elements_from(6 * self.n_tets + 3 * self.n_faces)
     }
 
-    /// Where the middles are, in the order of their numbers. Errors: the disk.
-    pub fn points(&self) -> Result<MiddlePoints> {
-        Ok(MiddlePoints(Records::open(&self.points, 0)?))
+    fn elements_from<const N: usize>(&self, first: u64) -> Result<ElementEdges<N>> {
+        Ok(ElementEdges { records: RecordReader::open(&self.elements, first)?, first })
+    }
+
+    /// Positions of the midpoints, in the order of their numbers. Errors: the disk.
+    pub fn points(&self) -> Result<MidpointReader> {
+        Ok(MidpointReader(RecordReader::open(&self.points, 0)?))
     }
 }
 
 /// Numbers of the edges of elements that have `N`, read one element after the other.
 pub(super) struct ElementEdges<const N: usize> {
-    records: Records<8>,
+    records: RecordReader<[u8; 8]>,
     first: u64,
 }
 
 impl<const N: usize> ElementEdges<N> {
-    /// Those of the next element. Errors: the disk.
+    /// The edge numbers of the next element. Errors: the disk.
     pub fn next(&mut self) -> Result<[u64; N]> {
         let mut edges = [0; N];
         for edge in &mut edges {
@@ -205,29 +143,97 @@ impl<const N: usize> ElementEdges<N> {
         Ok(edges)
     }
 
-    /// Those of the element with this number. Errors: the disk.
-    pub fn of(&mut self, element: u64) -> Result<[u64; N]> {
+    /// The edge numbers of the element with this number. Errors: the disk.
+    pub fn element(&mut self, element: u64) -> Result<[u64; N]> {
         self.records.seek(self.first + N as u64 * element)?;
         self.next()
     }
 }
 
-/// Positions of middles, read one after the other.
-pub(super) struct MiddlePoints(Records<POINT_BYTES>);
+/// Positions of midpoints in the order of their numbers.
+pub(super) struct MidpointReader(RecordReader<Position>);
 
-impl MiddlePoints {
-    /// The next one. Errors: the disk.
-    pub fn next(&mut self) -> Result<Option<[f64; 3]>> {
-        let Some(bytes) = self.0.next()? else {
-            return Ok(None);
-        };
-        let (numbers, _) = bytes.as_chunks::<8>();
-        Ok(Some([0, 1, 2].map(|i| f64::from_le_bytes(numbers[i]))))
-    }
-
-    /// That of the edge with this number. Errors: the disk.
-    pub fn of(&mut self, edge: u64) -> Result<[f64; 3]> {
+impl MidpointReader {
+    /// The midpoint of the edge with this number. Errors: the disk.
+    pub fn at(&mut self, edge: u64) -> Result<[f64; 3]> {
         self.0.seek(edge)?;
-        Ok(self.next()?.expect("every edge has its middle"))
+        self.next().expect("every edge has its midpoint")
     }
+}
+
+impl Iterator for MidpointReader {
+    type Item = Result<[f64; 3]>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let midpoint = self.0.next().transpose()?;
+        Some(midpoint.map(|midpoint| midpoint.position.0))
+    }
+}
+
+/// Edges of tetrahedra, boundary faces and, with `has_lines`, embedded edges, by their ends.
+fn element_edges(mesh: &mut Merged, has_lines: bool) -> Result<Sorted<ElementEdge>> {
+    let mut edges = Sorter::new(mesh.dir(), mesh.sorter_bytes());
+    let mut push =
+        |[a, b]: [u64; 2], place| edges.push(ElementEdge { low: a.min(b), high: a.max(b), place });
+    let lines = mesh.embedded().edges.iter().filter(|_| has_lines);
+    for (place, (ends, _)) in (LINE..).zip(lines) {
+        push(*ends, place)?;
+    }
+    let mut place = 0;
+    mesh.tets(|tet| {
+        for edge in TET_EDGES {
+            push(edge.map(|i| tet.nodes[i]), place)?;
+            place += 1;
+        }
+        Ok(())
+    })?;
+    let mut place = FACE;
+    mesh.faces().each(|face| {
+        for edge in FACE_EDGES {
+            push(edge.map(|i| face.vertices[i]), place)?;
+            place += 1;
+        }
+        Ok(())
+    })?;
+    Ok(edges.finish()?)
+}
+
+/// Number of edges of each sub-domain, the edges with the positions of their first ends, and the number of each element's edge.
+type NumberedEdges = (Vec<u64>, Sorted<HalfEdge>, Sorted<EdgeNumber>);
+
+/// Numbers the edges by their ends.
+fn numbered(mesh: &mut Merged, edges: Sorted<ElementEdge>) -> Result<NumberedEdges> {
+    let mut edges = MergeReader::new(edges);
+    let mut numbers = Sorter::new(mesh.dir(), mesh.sorter_bytes());
+    let mut halves = Sorter::new(mesh.dir(), mesh.sorter_bytes());
+    let firsts: Vec<u64> = mesh.parts().iter().map(|part| part.first_vertex).collect();
+    let mut counts = vec![0; firsts.len()];
+    let (mut n, mut last) = (0u64, None);
+    mesh.vertices(|number, vertex| {
+        while let Some(ElementEdge { low, high, place }) = edges.next_if(|e| e.low == number)? {
+            if last.replace([low, high]) != Some([low, high]) {
+                n += 1;
+                counts[firsts.partition_point(|&first| first <= number) - 1] += 1;
+                halves.push(HalfEdge { high, edge: n - 1, low_point: Payload(vertex.point) })?;
+            }
+            numbers.push(EdgeNumber { place, edge: n - 1 })?;
+        }
+        Ok(())
+    })?;
+    Ok((counts, halves.finish()?, numbers.finish()?))
+}
+
+/// The midpoints by number, from the second ends of the edges.
+fn positions(mesh: &mut Merged, halves: Sorted<HalfEdge>) -> Result<Sorted<Midpoint>> {
+    let mut halves = MergeReader::new(halves);
+    let mut midpoints = Sorter::new(mesh.dir(), mesh.sorter_bytes());
+    mesh.vertices(|number, vertex| {
+        while let Some(half) = halves.next_if(|half| half.high == number)? {
+            let (a, b) = (half.low_point.0, vertex.point);
+            let position = Payload([0, 1, 2].map(|i| 0.5 * a[i] + 0.5 * b[i]));
+            midpoints.push(Midpoint { edge: half.edge, position })?;
+        }
+        Ok(())
+    })?;
+    Ok(midpoints.finish()?)
 }

@@ -1,21 +1,20 @@
 //! Meshes and surfaces as files for other programs.
 //!
-//! A store becomes one conforming mesh: vertices and tetrahedra numbered densely in (sub-domain,
-//! local) order, a vertex that several sub-domains share once, and every input triangle that bounds
-//! a filled region as a boundary face, in the order of the input. Or each sub-domain becomes a mesh of its own, numbered as in the
-//! store, and the faces that it shares with others are boundary faces too. All is streamed: memory does not
-//! grow with the mesh. Files are written in a folder beside their place and renamed when they are whole
-//! and synced. Coordinates are never rounded.
+//! A store becomes one conforming mesh. Vertices and tetrahedra are numbered densely in (sub-domain, local) order, and vertices that several
+//! sub-domains share once. Every input triangle that bounds a filled region is a boundary face, in the order of the input. Alternatively each
+//! sub-domain becomes a mesh of its own, numbered as in the store, whose boundary includes the faces shared with others. All is streamed: memory
+//! does not grow with the mesh. Files are written in a folder beside the output, synced, and renamed when they are complete. Coordinates are
+//! never rounded.
 //!
-//! Reading order: [`export_with`] (what is written, in which format), `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh),
-//! `numbering` (shared vertices), `faces` (its boundary), `draft` and `stream` (files), then one file or folder per format.
+//! Reading order: [`export_with`], `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh), `numbering` (shared vertices),
+//! `faces` (the boundary), `output_files`, `stream` and `columns` (files), then one file or folder for each format.
 
 mod abaqus;
-mod chosen;
-mod defects;
+mod columns;
 mod dispatch;
 mod doubles;
-mod draft;
+mod embedded;
+mod embedded_list;
 mod error;
 mod faces;
 mod foam;
@@ -25,19 +24,19 @@ mod gmsh22;
 mod hdf5;
 mod medit;
 mod merged;
+mod merged_parts;
 mod mfem;
 mod midpoints;
 mod names;
 mod npy;
 mod npy_columns;
 mod numbering;
-mod on_surface;
+mod output_files;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod pieces;
 mod report;
 mod scope;
-mod selected;
 mod selection;
 mod split;
 mod stream;
@@ -46,17 +45,12 @@ mod surface;
 mod tests;
 mod tetgen;
 mod topology;
-mod vtu;
-mod vtu_boundary;
-mod vtu_layout;
-mod wires;
-mod wires_list;
+mod vtk;
 mod writers;
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
-pub use defects::defects;
 use error::Result;
 pub use error::WriteError;
 pub use format::{ENDINGS, MeshFormat};
@@ -68,12 +62,12 @@ pub use npy::bytes;
 pub use npy::{NpyField, NpyTable};
 pub use report::ExportReport;
 use report::FileCounts;
-pub use selected::{SelectedTet, SelectedVtu};
-pub use selection::{Content, Order, Selection, Share};
+pub use selection::{Content, ElementOrder, ExportSelection, Share};
 pub use surface::{SurfaceReport, surface, wires};
+pub use vtk::{SelectedTet, SelectedVtu, defects};
 
-use draft::{Draft, STDOUT};
-use merged::{Merged, Progress};
+use merged::{Merged, ReadProgress};
+use output_files::{OutputFiles, STDOUT};
 use scope::{FaceSet, Scope};
 use tetdb_base::storage::attempt;
 use tetdb_store::store::{Catalog, StoreError};
@@ -84,21 +78,21 @@ use writers::is_first;
 pub fn export(
     store: &mut Catalog,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
     memory_bytes: usize,
     report: &dyn Fn(u64, u64),
 ) -> Result<ExportReport> {
     export_with(store, (out, selection), memory_bytes, report, None)
 }
 
-/// Writes what `selection` says of the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
+/// Exports the selected part of the finished mesh of `store` to `out`, in the format of its extension; replaces existing files.
 ///
 /// Holds about `memory_bytes`, and reports progress as (done, total) in records read. The files depend on the
-/// mesh alone. Where [`Selection::is_shared_file`] says so, several `writers` may each call this; files and counts are those of the first.
-/// Errors: [`WriteError`], also of others; no file of `out`'s name is touched before all are whole.
+/// mesh alone. If [`ExportSelection::is_shared_file`], several `writers` may each call this function; the first returns files and counts.
+/// Errors: [`WriteError`], also those of other writers; no file of `out`'s name is touched before all are complete.
 pub fn export_with(
     store: &mut Catalog,
-    (out, selection): (&Path, &Selection),
+    (out, selection): (&Path, &ExportSelection),
     memory_bytes: usize,
     report: &dyn Fn(u64, u64),
     writers: Option<&dyn Writers>,
@@ -114,16 +108,16 @@ pub fn export_with(
             store.subdomain(rank)?;
         }
         check_regions(store, selection)?;
-        let mut draft = Draft::new(out)?;
+        let mut outputs = OutputFiles::new(out)?;
         let counts = match format {
-            MeshFormat::Topology => topology::write(store, &mut draft, out, memory_bytes)?,
+            MeshFormat::Topology => topology::write(store, &mut outputs, out, memory_bytes)?,
             #[cfg(feature = "parquet")]
             MeshFormat::Parquet => {
-                parquet::write(store, &mut draft, out, selection, memory_bytes, report)?
+                parquet::write(store, &mut outputs, out, selection, memory_bytes, report)?
             }
             _ if format == MeshFormat::Pvtu || selection.pieces && !format.numbers_globally() => {
                 let what = (format, selection);
-                pieces::write(store, &mut draft, out, what, memory_bytes, report)?
+                pieces::write(store, &mut outputs, out, what, memory_bytes, report)?
             }
             _ => {
                 let apart = format == MeshFormat::VtkHdf;
@@ -144,26 +138,26 @@ pub fn export_with(
                     },
                     apart,
                 };
-                let progress = Progress::new(report);
-                let dir = draft.dir().to_owned();
+                let progress = ReadProgress::new(report);
+                let dir = outputs.dir().to_owned();
                 let mut mesh = Merged::open(store, scope, &dir, memory_bytes, progress)?;
                 if selection.split_sheets {
-                    split::split(&mut mesh, &mut draft, out)?;
+                    split::split(&mut mesh, &mut outputs, out)?;
                 }
-                dispatch::write(format, selection, &mut mesh, &mut draft, out, writers)?
+                dispatch::write(format, selection, &mut mesh, &mut outputs, out, writers)?
             }
         };
         Ok(ExportReport {
             vertices: counts.vertices,
             tets: counts.tets,
             triangles: counts.triangles,
-            files: draft.publish()?,
+            files: outputs.publish()?,
         })
     })?
 }
 
-/// Refuses regions that the store does not have, or that are empty.
-fn check_regions(store: &mut Catalog, selection: &Selection) -> Result<()> {
+/// Refuses regions that do not exist or are empty.
+fn check_regions(store: &mut Catalog, selection: &ExportSelection) -> Result<()> {
     let rows = store.regions()?;
     let filled: Vec<u32> = (rows.iter().filter(|row| row.filled)).map(|row| row.region).collect();
     match (selection.regions.iter()).find(|region| !filled.contains(region)) {
@@ -172,11 +166,11 @@ fn check_regions(store: &mut Catalog, selection: &Selection) -> Result<()> {
     }
 }
 
-/// The format of `out`, if it can hold what is selected.
-pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
+/// The format of `out`. Errors: the format cannot hold the selection.
+pub fn check(out: &Path, selection: &ExportSelection) -> Result<MeshFormat> {
     let path = || out.to_owned();
     let known = ENDINGS;
-    let named = selection.format.or_else(|| MeshFormat::of_extension(out));
+    let named = selection.format.or_else(|| MeshFormat::from_extension(out));
     let format = named.ok_or_else(|| WriteError::UnknownFormat { path: path(), known })?;
     let stdout = out == Path::new(STDOUT);
     let (pieces, regions) = (selection.pieces, !selection.regions.is_empty());
@@ -184,7 +178,7 @@ pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
     let asked = [
         (selection.content != Content::Mesh, FACES_ALONE),
         (selection.ascii, TEXT),
-        (selection.order == Order::Second, SECOND_ORDER),
+        (selection.order == ElementOrder::Second, SECOND_ORDER),
         (selection.ghosts, GHOSTS),
         (pieces || subdomains, SUBDOMAINS),
         (regions, REGIONS),

@@ -1,13 +1,13 @@
-//! Names of labels and regions for programs that do not take every text.
+//! Names of labels and regions for programs that restrict them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// For Gmsh, where a name ends at the next quote or line.
+/// A name for Gmsh, where a name ends at the next quote or line.
 pub(super) fn quotable(name: &str) -> String {
     name.replace('"', "'").replace(['\n', '\r'], " ")
 }
 
-/// Names that Abaqus and OpenFOAM take: letters, digits, `_` and `-`, a letter first, at most 80, case not distinguished.
+/// Names for Abaqus and OpenFOAM: letters, digits, `_` and `-`, a letter first, at most 80 characters, distinct without regard to case.
 pub(super) fn set_names(labels: &BTreeMap<u32, String>) -> BTreeMap<u32, String> {
     let mut taken = BTreeSet::new();
     let mut names = BTreeMap::new();

@@ -1,14 +1,15 @@
-//! NumPy's array files: a head that tells type and shape, then the numbers, little end first.
+//! NumPy's array files, and other files written front to back.
 //!
+//! An array file has a head with type and shape, then the numbers, little end first.
 //! Source: the NPY format, version 1.0, of NumPy's documentation (NEP 1).
 
 use std::path::{Path, PathBuf};
 
-use super::draft::Draft;
-use super::error::{Result, WriteError};
+use super::error::Result;
+use super::output_files::OutputFiles;
 use super::stream::{Stream, Strip};
 
-/// Bytes of every head written here: a multiple of 64, as the format asks, with room for any number of rows.
+/// Bytes of every head written here: a multiple of 64, as the format requires, and enough for any number of rows.
 pub(super) const HEAD_BYTES: usize = 1024;
 /// Magic, version 1.0.
 const MAGIC: &[u8; 8] = b"\x93NUMPY\x01\x00";
@@ -33,13 +34,13 @@ pub struct NpyField {
     pub name: &'static str,
     /// Type of its numbers, such as `<f8`.
     pub kind: &'static str,
-    /// How many numbers it has, such as `4, 3`; empty for one.
+    /// Shape of its numbers, such as `4, 3`; empty for one number.
     pub shape: &'static str,
 }
 
 /// Rows of fields being written to one file; nothing has its name until [`NpyTable::finish`].
 pub struct NpyTable {
-    draft: Draft,
+    outputs: OutputFiles,
     path: PathBuf,
     kind: String,
     out: Stream,
@@ -49,8 +50,8 @@ pub struct NpyTable {
 impl NpyTable {
     /// Begins `out`. Errors: its folder cannot be written.
     pub fn new(out: &Path, fields: &[NpyField]) -> Result<Self> {
-        let mut draft = Draft::new(out)?;
-        let path = draft.create(out, HEAD_BYTES as u64)?;
+        let mut outputs = OutputFiles::new(out)?;
+        let path = outputs.create(out, HEAD_BYTES as u64)?;
         let fields: Vec<String> = fields
             .iter()
             .map(|f| match f.shape {
@@ -61,7 +62,7 @@ impl NpyTable {
         let kind = format!("[{}]", fields.join(", "));
         let mut stream = Stream::open(&path)?;
         stream.bytes(&head(&kind, 0, ""));
-        Ok(Self { draft, path, kind, out: stream, rows: 0 })
+        Ok(Self { outputs, path, kind, out: stream, rows: 0 })
     }
 
     /// Adds a row, its fields one after the other. Errors: the disk.
@@ -71,29 +72,29 @@ impl NpyTable {
         self.out.end()
     }
 
-    /// Tells the number of rows in the head and gives the file its name; returns its length. Errors: the disk.
+    /// Writes the number of rows into the head and gives the file its name; returns its length. Errors: the disk.
     pub fn finish(self) -> Result<u64> {
         self.out.finish()?;
         let mut strip = Strip::open(&self.path, 0, HEAD_BYTES as u64)?;
         strip.put(&head(&self.kind, self.rows, ""))?;
         strip.finish()?;
-        length(self.draft)
+        self.outputs.publish_one()
     }
 }
 
 /// Lines of text being written to one file; nothing has its name until [`TextFile::finish`].
 pub struct TextFile {
-    draft: Draft,
+    outputs: OutputFiles,
     out: Stream,
 }
 
 impl TextFile {
     /// Begins `out`. Errors: its folder cannot be written.
     pub fn new(out: &Path) -> Result<Self> {
-        let mut draft = Draft::new(out)?;
-        let path = draft.create(out, 0)?;
+        let mut outputs = OutputFiles::new(out)?;
+        let path = outputs.create(out, 0)?;
         let out = Stream::open(&path)?;
-        Ok(Self { draft, out })
+        Ok(Self { outputs, out })
     }
 
     /// Adds a line. Errors: the disk.
@@ -106,26 +107,16 @@ impl TextFile {
     /// Gives the file its name; returns its length. Errors: the disk.
     pub fn finish(self) -> Result<u64> {
         self.out.finish()?;
-        length(self.draft)
+        self.outputs.publish_one()
     }
 }
 
 /// Writes a whole file at once; returns its length. Errors: the disk.
 pub fn bytes(out: &Path, content: &[u8]) -> Result<u64> {
-    let mut draft = Draft::new(out)?;
-    let path = draft.create(out, content.len() as u64)?;
+    let mut outputs = OutputFiles::new(out)?;
+    let path = outputs.create(out, content.len() as u64)?;
     let mut stream = Stream::open(&path)?;
     stream.bytes(content);
     stream.finish()?;
-    length(draft)
-}
-
-/// Publishes the one file of a draft.
-pub(super) fn length(draft: Draft) -> Result<u64> {
-    let files = draft.publish()?;
-    let [(_, bytes)] = files[..] else {
-        let (path, source) = (PathBuf::new(), std::io::Error::other("not one file"));
-        return Err(WriteError::Io { path, source });
-    };
-    Ok(bytes)
+    outputs.publish_one()
 }

@@ -4,81 +4,104 @@
 
 use std::path::{Path, PathBuf};
 
-use super::draft::Draft;
+use super::columns::{TableColumn, column, put_row};
 use super::error::Result;
-use super::merged::{Measured, Merged};
+use super::faces::MergedFace;
+use super::merged::{Measured, Merged, MergedTet};
 use super::npy::{HEAD_BYTES, head};
+use super::output_files::OutputFiles;
 use super::stream::Strip;
-use super::vtu_layout::Index;
+use tetdb_schema::record::SealedVertex;
 
-/// Makes the files of one mesh.
-struct Columns<'a> {
-    draft: &'a mut Draft,
-    out: &'a Path,
+/// Arrays of equally many rows being written.
+struct Arrays<T> {
+    columns: Vec<TableColumn<T>>,
+    strips: Vec<Strip>,
 }
 
-impl Columns<'_> {
-    /// A file of `rows` entries of `kind` with `width` numbers each (0: a plain number), its head written.
-    fn open(&mut self, name: &str, kind: &str, rows: u64, width: u64) -> Result<Strip> {
-        let bytes: u64 = kind[2..].parse().expect("kinds end with their length");
-        let length = rows * width.max(1) * bytes;
-        let whole = HEAD_BYTES as u64 + length;
-        let path = self.draft.create(&beside(self.out, name), whole)?;
-        let inner = match width {
-            0 => String::new(),
-            width => format!(" {width}"),
+impl<T> Arrays<T> {
+    /// Begins the files of `columns` beside `out`, their heads written. Errors: the disk.
+    fn create(
+        outputs: &mut OutputFiles,
+        out: &Path,
+        rows: u64,
+        columns: Vec<TableColumn<T>>,
+    ) -> Result<Self> {
+        let strip = |column: &TableColumn<T>| {
+            let length = rows * column.components * column.number.bytes();
+            let file_bytes = HEAD_BYTES as u64 + length;
+            let path = outputs.create(&array_path(out, column.name), file_bytes)?;
+            let inner = match column.components {
+                1 => String::new(),
+                n => format!(" {n}"),
+            };
+            let mut strip = Strip::open(&path, 0, file_bytes)?;
+            strip.put(&head(&format!("'{}'", column.number.numpy()), rows, &inner))?;
+            Ok(strip)
         };
-        let mut strip = Strip::open(&path, 0, whole)?;
-        strip.put(&head(&format!("'{kind}'"), rows, &inner))?;
-        Ok(strip)
+        let strips = columns.iter().map(strip).collect::<Result<_>>()?;
+        Ok(Self { columns, strips })
+    }
+
+    fn row(&mut self, row: &T) -> Result<()> {
+        put_row(row, &self.columns, &mut self.strips)
+    }
+
+    fn finish(self) -> Result<()> {
+        self.strips.into_iter().try_for_each(Strip::finish)
     }
 }
 
 /// `NAME_column.npy` beside `NAME.npy`.
-fn beside(out: &Path, column: &str) -> PathBuf {
+fn array_path(out: &Path, column: &str) -> PathBuf {
     let mut name = out.file_stem().unwrap_or_default().to_owned();
     name.push(format!("_{column}.npy"));
     out.with_file_name(name)
 }
 
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+/// Numbers of vertices, in 32 bits where all fit.
+fn vertex_numbers<T, const N: usize>(
+    name: &'static str,
+    n_vertices: u64,
+    numbers: fn(&T) -> [u64; N],
+) -> TableColumn<T>
+where
+    T: 'static,
+{
+    match n_vertices <= i32::MAX as u64 {
+        true => column(name, move |row| numbers(row).map(|v| v as i32)),
+        false => column(name, move |row| numbers(row).map(|v| v as i64)),
+    }
+}
+
+pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     mesh.expect_passes(1, 1);
-    let (n_vertices, n_tets, n_faces) = (mesh.n_vertices(), mesh.n_tets(), mesh.n_faces());
-    let index = Index::new(n_vertices, 0);
-    let number = if index.kind() == "Int32" { "<i4" } else { "<i8" };
-    let mut columns = Columns { draft, out };
-    let mut points = columns.open("points", "<f8", n_vertices, 3)?;
-    let mut vertex_ids = columns.open("vertex_id", "<i8", n_vertices, 0)?;
-    mesh.vertices(|_, vertex| {
-        vertex_ids.put(&vertex.id.to_le_bytes())?;
-        vertex.point.iter().try_for_each(|x| points.put(&x.to_le_bytes()))
-    })?;
-    points.finish()?;
-    vertex_ids.finish()?;
+    let n_vertices = mesh.n_vertices();
+    let columns = vec![
+        column("points", |vertex: &SealedVertex| vertex.point),
+        column("vertex_id", |vertex: &SealedVertex| vertex.id as i64),
+    ];
+    let mut arrays = Arrays::create(outputs, out, n_vertices, columns)?;
+    mesh.vertices(|_, vertex| arrays.row(vertex))?;
+    arrays.finish()?;
 
-    let mut nodes = columns.open("tets", number, n_tets, 4)?;
-    let mut regions = columns.open("region", "<u4", n_tets, 0)?;
-    let mut ranks = columns.open("subdomain", "<u4", n_tets, 0)?;
-    let mut qualities = columns.open("quality", "<f8", n_tets, 0)?;
-    let mut ids = columns.open("global_id", "<i8", n_tets, 0)?;
-    mesh.measured_tets(Measured::Quality, |tet| {
-        tet.nodes.iter().try_for_each(|&v| index.put(&mut nodes, v))?;
-        regions.put(&tet.region.to_le_bytes())?;
-        ranks.put(&tet.subdomain.to_le_bytes())?;
-        qualities.put(&tet.quality.to_le_bytes())?;
-        ids.put(&tet.id.number().to_le_bytes())
-    })?;
+    let columns = vec![
+        vertex_numbers("tets", n_vertices, |tet: &MergedTet| tet.nodes),
+        column("region", |tet: &MergedTet| tet.region),
+        column("subdomain", |tet: &MergedTet| tet.subdomain),
+        column("quality", |tet: &MergedTet| tet.quality),
+        column("global_id", |tet: &MergedTet| tet.id.number() as i64),
+    ];
+    let mut arrays = Arrays::create(outputs, out, mesh.n_tets(), columns)?;
+    mesh.measured_tets(Measured::Quality, |tet| arrays.row(tet))?;
+    arrays.finish()?;
 
-    let mut faces = columns.open("triangles", number, n_faces, 3)?;
-    let mut labels = columns.open("label", "<u4", n_faces, 0)?;
-    let mut inputs = columns.open("input_id", "<i8", n_faces, 0)?;
-    mesh.faces().each(|face| {
-        face.vertices.iter().try_for_each(|&v| index.put(&mut faces, v))?;
-        labels.put(&face.label.to_le_bytes())?;
-        let input = face.triangle().map_or(-1, |t| t as i64);
-        inputs.put(&input.to_le_bytes())
-    })?;
-    [nodes, regions, ranks, qualities, ids, faces, labels, inputs]
-        .into_iter()
-        .try_for_each(Strip::finish)
+    let columns = vec![
+        vertex_numbers("triangles", n_vertices, |face: &MergedFace| face.vertices),
+        column("label", |face: &MergedFace| face.label),
+        column("input_id", |face: &MergedFace| face.triangle().map_or(-1, |t| t as i64)),
+    ];
+    let mut arrays = Arrays::create(outputs, out, mesh.n_faces(), columns)?;
+    mesh.faces().each(|face| arrays.row(face))?;
+    arrays.finish()
 }

@@ -1,8 +1,8 @@
 //! Columns as Apache Parquet: for each sub-domain a file of tetrahedra and one of vertices.
 //!
-//! `NAME_00007.parquet` has a row for each tetrahedron, `NAME_00007_vertices.parquet` one for each vertex; `NAME.parquet` is not
-//! written. Rows are in the order of the store, which is that of a Hilbert curve, and each group of rows has the least and greatest value
-//! of each column: a program that asks for a place reads the groups that are there.
+//! `NAME_00007.parquet` has a row for each tetrahedron, `NAME_00007_vertices.parquet` one for each vertex; `NAME.parquet` is not written. Rows are
+//! in the order of the store, along a Hilbert curve. Each group of rows has the least and greatest value of each column, so that programs read
+//! only the groups of a box of space.
 
 use std::fs::OpenOptions;
 use std::io::BufWriter;
@@ -17,15 +17,15 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
 use tetdb_schema::ids::TetId;
 
-use super::draft::Draft;
+use super::output_files::OutputFiles;
 use super::pieces::piece_path;
-use super::{FileCounts, Result, Selection, WriteError};
+use super::{ExportSelection, FileCounts, Result, WriteError};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::check_cancelled;
 use tetdb_store::sealed::{Shape, Subdomain};
 use tetdb_store::store::Catalog;
 
-/// Rows of a group: small enough that a place is in few of them, large enough for columns to pack well.
+/// Rows of a group: few enough that a box of space meets few groups, enough for columns to compress well.
 const GROUP_ROWS: usize = 65_536;
 
 /// Ids are those of `tetdb query`: they last. `x y z` is the centroid.
@@ -55,8 +55,8 @@ fn failed(path: &Path, error: ParquetError) -> WriteError {
 }
 
 impl Table {
-    fn create(draft: &mut Draft, out: &Path, schema: &str, bytes: u64) -> Result<Self> {
-        let path = draft.create(out, bytes)?;
+    fn create(outputs: &mut OutputFiles, out: &Path, schema: &str, bytes: u64) -> Result<Self> {
+        let path = outputs.create(out, bytes)?;
         let file = OpenOptions::new().write(true).open(&path);
         let file = BufWriter::new(file.map_err(|e| WriteError::io(&path, e))?);
         let schema = Arc::new(parse_message_type(schema).expect("the schemas are well formed"));
@@ -102,9 +102,9 @@ fn column<T: DataType>(
 
 pub(super) fn write(
     store: &mut Catalog,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
     memory: usize,
     report: &dyn Fn(u64, u64),
 ) -> Result<FileCounts> {
@@ -115,7 +115,7 @@ pub(super) fn write(
     for row in rows {
         let mut part = store.open_subdomain(row.rank, memory / 2)?;
         let piece = piece_path(out, row.rank, "parquet");
-        let mut table = Table::create(draft, &piece, TETS, row.tets * 32)?;
+        let mut table = Table::create(outputs, &piece, TETS, row.tets * 32)?;
         let mut tets = Tets::default();
         for chunk in 0..row.chunks[0] {
             tets.add(&mut part, chunk)?;
@@ -130,7 +130,7 @@ pub(super) fn write(
         counts.vertices += row.vertices;
         let name = piece.file_stem().unwrap_or_default().to_string_lossy();
         let beside = piece.with_file_name(format!("{name}_vertices.parquet"));
-        let mut table = Table::create(draft, &beside, VERTICES, row.vertices * 24)?;
+        let mut table = Table::create(outputs, &beside, VERTICES, row.vertices * 24)?;
         vertices(&mut part, &mut table)?;
         table.finish()?;
     }
@@ -157,7 +157,7 @@ impl Tets {
             self.ids.push(id.number() as i64);
             self.regions.push(tet.region as i32);
             let points = corners.map(|c| c.point);
-            let shape = Shape::of(points);
+            let shape = Shape::new(points);
             let [x, y, z] = (points.iter().copied().sum::<Point>() * 0.25).to_array();
             let numbers = [shape.quality, shape.volume, x, y, z];
             for (column, number) in self.numbers.iter_mut().zip(numbers) {

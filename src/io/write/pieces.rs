@@ -1,23 +1,25 @@
-//! Each sub-domain as a mesh of its own: vertices and tetrahedra as they are numbered in the store, and the faces it shares
-//! with others among its boundary faces, labelled `interface_N` by the sub-domain N behind them.
+//! Each sub-domain as a mesh of its own, with the numbers of the store.
+//!
+//! The faces shared with other sub-domains are boundary faces, labelled `interface_N` by the sub-domain N behind them.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::columns::Number;
 use super::dispatch;
-use super::draft::Draft;
-use super::merged::{Merged, Progress};
+use super::merged::{Merged, ReadProgress};
+use super::output_files::OutputFiles;
 use super::scope::{FaceSet, Scope};
 use super::stream::Stream;
-use super::{FileCounts, MeshFormat, Result, Selection, WriteError};
+use super::{ExportSelection, FileCounts, MeshFormat, Result, WriteError, vtk};
 use tetdb_store::store::Catalog;
 
 pub(super) fn write(
     store: &mut Catalog,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    (format, selection): (MeshFormat, &Selection),
+    (format, selection): (MeshFormat, &ExportSelection),
     memory: usize,
     report: &dyn Fn(u64, u64),
 ) -> Result<FileCounts> {
@@ -36,7 +38,7 @@ pub(super) fn write(
     for row in rows {
         let piece = piece_path(out, row.rank, extension);
         let is_written = selection.writes_piece(row.rank);
-        // Who names the pieces of all looks which of them have anything of the regions.
+        // The process that names all pieces reads which of them have tetrahedra of the regions.
         let is_read = is_written || names_all && !selection.regions.is_empty();
         if !is_read {
             pieces.push(piece);
@@ -48,17 +50,17 @@ pub(super) fn write(
             faces: FaceSet::SkinAndInterfaces,
             apart: false,
         };
-        let dir = draft.dir().join(format!("piece-{}", row.rank));
+        let dir = outputs.dir().join(format!("piece-{}", row.rank));
         fs::create_dir(&dir).map_err(|e| WriteError::io(&dir, e))?;
-        // A piece's records stand for its tetrahedra in the whole.
+        // Progress counts the tetrahedra of all pieces.
         let report_piece = |done: u64, total: u64| {
             let share = done as f64 / total.max(1) as f64;
             report(counts.tets + (share * row.tets as f64) as u64, all);
         };
-        let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&report_piece))?;
+        let mut mesh = Merged::open(store, scope, &dir, memory, ReadProgress::new(&report_piece))?;
         let is_empty = mesh.n_tets() == 0;
         let written = match is_written && !is_empty {
-            true => dispatch::write(format, selection, &mut mesh, draft, &piece, None)?,
+            true => dispatch::write(format, selection, &mut mesh, outputs, &piece, None)?,
             false => FileCounts::default(),
         };
         fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
@@ -68,7 +70,7 @@ pub(super) fn write(
         }
     }
     if names_all {
-        head(draft, out, &pieces)?;
+        head(outputs, out, &pieces)?;
     }
     Ok(counts)
 }
@@ -80,32 +82,23 @@ pub(super) fn piece_path(out: &Path, rank: u32, extension: &str) -> PathBuf {
 }
 
 /// The file that names the pieces. Arrays as in `vtu`. Source: the VTK file formats document, "Parallel file formats".
-fn head(draft: &mut Draft, out: &Path, pieces: &[PathBuf]) -> Result<()> {
-    let path = draft.create(out, 2000)?;
+fn head(outputs: &mut OutputFiles, out: &Path, pieces: &[PathBuf]) -> Result<()> {
+    let path = outputs.create(out, 2000)?;
     let mut stream = Stream::open(&path)?;
     stream.text(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
          header_type=\"UInt64\">\n  <PUnstructuredGrid GhostLevel=\"0\">\n",
     );
-    let groups: [(&str, &[(&str, &str)]); 2] = [
-        ("PPointData", &[("global_id", "Int64")]),
-        (
-            "PCellData",
-            &[
-                ("subdomain", "UInt32"),
-                ("region", "UInt32"),
-                ("quality", "Float64"),
-                ("excess", "Float64"),
-                ("global_id", "Int64"),
-            ],
-        ),
-    ];
-    for (group, arrays) in groups {
-        stream.text(&format!("    <{group}>\n"));
-        for (name, kind) in arrays {
-            stream.text(&format!("      <PDataArray type=\"{kind}\" Name=\"{name}\"/>\n"));
-        }
-        stream.text(&format!("    </{group}>\n"));
+    let arrays = |columns: Vec<(&str, Number)>| -> String {
+        let line = |(name, number): (&str, Number)| {
+            format!("      <PDataArray type=\"{}\" Name=\"{name}\"/>\n", number.vtk())
+        };
+        columns.into_iter().map(line).collect()
+    };
+    let points = vtk::vertex_columns().iter().map(|c| (c.name, c.number)).collect();
+    let cells = vtk::tet_columns().iter().map(|c| (c.name, c.number)).collect();
+    for (group, columns) in [("PPointData", points), ("PCellData", cells)] {
+        stream.text(&format!("    <{group}>\n{}    </{group}>\n", arrays(columns)));
     }
     stream.text("    <PPoints>\n      <PDataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"/>\n    </PPoints>\n");
     for piece in pieces {

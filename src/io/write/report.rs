@@ -1,8 +1,8 @@
-//! What was written.
+//! The result of an export.
 
 use std::path::PathBuf;
 
-/// What was exported.
+/// The result of an export.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct ExportReport {
     /// Each file with its length in bytes.
@@ -15,7 +15,7 @@ pub struct ExportReport {
     pub triangles: u64,
 }
 
-/// How many of each were written.
+/// Numbers of written elements.
 #[derive(Clone, Copy, Default)]
 pub(super) struct FileCounts {
     pub vertices: u64,

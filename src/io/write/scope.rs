@@ -1,8 +1,8 @@
-//! What of the sub-domains becomes one mesh.
+//! The part of a store that becomes one mesh.
 
 use std::collections::BTreeSet;
 
-/// Which faces bound what is written, beside those that it shares with sub-domains that are not written.
+/// Boundary faces of the written mesh, besides those shared with sub-domains that are not written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FaceSet {
     /// Input triangles.
@@ -11,23 +11,23 @@ pub(super) enum FaceSet {
     SkinAndInterfaces,
     /// All interface faces, no input triangle.
     Interfaces,
-    /// No face, whatever is beyond: for who writes no faces.
+    /// No face at all, for processes that write no faces.
     Nothing,
 }
 
-/// What is written: these sub-domains, or all when there are none, with these faces.
+/// The written part: these sub-domains, or all when there are none, with these faces.
 #[derive(Clone, Copy)]
 pub(super) struct Scope<'s> {
     pub ranks: &'s BTreeSet<u32>,
     /// Only these regions, or all when there are none.
     pub regions: &'s BTreeSet<u32>,
     pub faces: FaceSet,
-    /// Each sub-domain numbers all its vertices, also those it shares.
+    /// Each sub-domain numbers all its vertices, also shared ones.
     pub apart: bool,
 }
 
 impl Scope<'_> {
-    /// Whether a sub-domain is written.
+    /// Returns whether a sub-domain is written.
     pub fn holds(&self, rank: u32) -> bool {
         self.ranks.is_empty() || self.ranks.contains(&rank)
     }
@@ -38,7 +38,7 @@ impl Scope<'_> {
         if is_written { region } else { 0 }
     }
 
-    /// Whether the face between sub-domain `rank`, which is written, and `other` is listed, and by this side.
+    /// Returns whether sub-domain `rank`, which is written, lists its faces towards `other`.
     pub fn lists(&self, rank: u32, other: u32) -> bool {
         !self.holds(other) || (self.faces != FaceSet::Skin && rank < other)
     }

@@ -1,51 +1,51 @@
-//! What of a mesh is written.
+//! The part of a mesh to export, and its form.
 
 use std::collections::BTreeSet;
 
 use super::format::MeshFormat;
 
-/// What of a mesh is written.
+/// The part of a mesh to export, and its form.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Selection {
-    /// Ranks of sub-domains; none stands for all. What bounds them towards others is boundary.
+pub struct ExportSelection {
+    /// Ranks of sub-domains; none stands for all. Faces towards other sub-domains are boundary.
     pub subdomains: BTreeSet<u32>,
-    /// Numbers of regions; none stands for all. What bounds them is boundary.
+    /// Numbers of regions; none stands for all. Their outer faces are boundary.
     pub regions: BTreeSet<u32>,
     /// Each sub-domain in a file of its own.
     pub pieces: bool,
-    /// Of the pieces those that this process writes; by default all.
+    /// The pieces that this process writes; by default all.
     pub share: Option<Share>,
-    /// Which elements are written.
+    /// The elements to write.
     pub content: Content,
-    /// The format; by default the one that the file's name tells.
+    /// The format; by default the one of the file's name.
     pub format: Option<MeshFormat>,
     /// Text where the format has both text and binary.
     pub ascii: bool,
-    /// Of each part the tetrahedra that touch other parts, listed for those (`.msh`).
+    /// List the ghosts of each partition: the tetrahedra of others that touch it (`.msh`).
     pub ghosts: bool,
-    /// The vertices on sheets once for each side, and its triangles boundary of both.
+    /// Write the vertices of sheets once for each side, and their triangles as boundary of both.
     pub split_sheets: bool,
     /// Nodes of the elements.
-    pub order: Order,
+    pub order: ElementOrder,
 }
 
 /// The pieces of one of several processes, which together write all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Share {
-    /// Which of them, from 1.
+    /// Number of the process, from 1.
     pub number: u32,
-    /// How many there are.
+    /// Number of all processes.
     pub of: u32,
 }
 
-impl Selection {
-    /// Whether this process writes the piece of a sub-domain.
+impl ExportSelection {
+    /// Returns whether this process writes the piece of a sub-domain.
     pub(super) fn writes_piece(&self, rank: u32) -> bool {
         let is_asked = self.subdomains.is_empty() || self.subdomains.contains(&rank);
         is_asked && (self.share).is_none_or(|share| rank % share.of == share.number - 1)
     }
 
-    /// Whether each sub-domain has files of its own.
+    /// Returns whether each sub-domain has files of its own.
     pub fn in_pieces(&self, format: MeshFormat) -> bool {
         #[cfg(feature = "parquet")]
         if format == MeshFormat::Parquet {
@@ -54,13 +54,13 @@ impl Selection {
         self.pieces || format == MeshFormat::Pvtu
     }
 
-    /// Whether several processes can write the one file together: the tetrahedra of `.vtkhdf`, a partition for each sub-domain.
+    /// Returns whether several processes can write the file together: the tetrahedra of `.vtkhdf`, a partition for each sub-domain.
     pub fn is_shared_file(&self, format: MeshFormat) -> bool {
-        let is_plain = self.content == Content::Mesh && self.order == Order::First;
+        let is_plain = self.content == Content::Mesh && self.order == ElementOrder::First;
         format == MeshFormat::VtkHdf && is_plain && !self.pieces && !self.split_sheets
     }
 
-    /// Whether this process writes what names the pieces of all.
+    /// Returns whether this process writes the file that names all pieces.
     pub(super) fn writes_head(&self) -> bool {
         self.share.is_none_or(|share| share.number == 1)
     }
@@ -68,15 +68,15 @@ impl Selection {
 
 /// Nodes of the elements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Order {
+pub enum ElementOrder {
     /// Corners.
     #[default]
     First,
-    /// Corners and the middles of edges.
+    /// Corners and the midpoints of edges.
     Second,
 }
 
-/// Which elements are written.
+/// The elements to write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Content {
     /// Tetrahedra and boundary faces.

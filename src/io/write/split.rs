@@ -1,23 +1,24 @@
-//! Sheets as slits: the vertices on a sheet stand once for each side, and its triangles are boundary on both.
+//! Sheets as slits: the vertices of a sheet are written once for each side, and its triangles are boundary on both.
 //!
-//! A sheet is an input triangle with the same region on both sides. The tetrahedra around each of its vertices fall apart into those that reach
-//! each other through faces that are no sheet's; all but the first of these have a double of the vertex. Around a vertex on a free edge they all
-//! reach each other, so that it stays one.
+//! A sheet is an input triangle with the same region on both sides. The tetrahedra around a vertex of a sheet form
+//! classes that are connected through faces that are no sheet's. The first class keeps the vertex, each other one gets a double of it. Around a
+//! vertex on a free edge there is one class.
 
 use std::path::Path;
 
 use super::doubles::{Change, Double, Doubles};
-use super::draft::Draft;
 use super::error::Result;
-use super::faces::Face;
+use super::faces::MergedFace;
 use super::merged::Merged;
-use super::stream::{Records, Stream, here, scratch};
-use tetdb_base::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
+use super::output_files::OutputFiles;
+use super::stream::{RecordReader, Stream, save, scratch};
+use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
 use tetdb_schema::record::FACES;
+use tetdb_store::sealed::{BitSet, MergeReader};
 
 sort_record! {
     /// A tetrahedron at a vertex of a sheet.
-    struct Corner {
+    struct TetCorner {
         vertex: u64,
         tet: u64,
         subdomain: u32,
@@ -38,12 +39,12 @@ sort_record! {
 }
 
 sort_record! {
-    /// What stands for a vertex of a face, on the side that the face is of and on the other.
+    /// The replacements of a face's vertex, on the side of the face's tetrahedron and on the other.
     struct FaceChange {
         face: u64,
         vertex: u64,
         sides: [u64; 2],
-        /// The tetrahedron of a sheet's other side, and its sub-domain; [`NONE`] where that is not written.
+        /// The tetrahedron on the other side of a sheet; [`NONE`] where it is not written.
         back_tet: u64,
         back_rank: u32,
     }
@@ -52,7 +53,7 @@ sort_record! {
 const NONE: u64 = u64::MAX;
 
 /// Splits the sheets of `mesh`, and lists the pairs in a file beside `out`. Errors: damage, the disk.
-pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+pub(super) fn split(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     let (corners, face_corners) = at_sheets(mesh)?;
     let dir = mesh.dir().to_owned();
     let n_vertices = mesh.n_vertices();
@@ -61,25 +62,20 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     let originals = dir.join("doubled");
     let mut stream = scratch(&originals)?;
     let mut n = 0;
-    let mut corners = corners.peekable();
-    let mut face_corners = face_corners.peekable();
-    while let Some(first) = corners.next() {
-        let first = first?;
-        let vertex = first.vertex;
-        let mut tets = vec![first];
-        while let Some(next) = corners.next_if(|c| here(c, |c| c.vertex == vertex)) {
-            tets.push(next?);
-        }
+    let (mut corners, mut face_corners) =
+        (MergeReader::new(corners), MergeReader::new(face_corners));
+    let mut tets = Vec::new();
+    while corners.next_group(&mut tets, |a, b| a.vertex == b.vertex)? {
+        let vertex = tets[0].vertex;
         let mut faces = Vec::new();
-        while let Some(next) = face_corners.next_if(|f| here(f, |f| f.vertex <= vertex)) {
-            faces.push(next?);
+        while let Some(next) = face_corners.next_if(|f| f.vertex <= vertex)? {
+            faces.push(next);
         }
         let numbers = numbers_at(vertex, &tets, &faces, n_vertices + n);
         let doubles = numbers.iter().filter(|&&number| number != vertex);
         let end = doubles.copied().max().map_or(n, |last| last + 1 - n_vertices);
         for _ in n..end {
-            stream.bytes(&vertex.to_le_bytes());
-            stream.end()?;
+            stream.record(&vertex.to_le_bytes())?;
         }
         n = end;
         for (tet, &double) in tets.iter().zip(&numbers).filter(|(_, double)| **double != vertex) {
@@ -94,42 +90,32 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     }
     stream.finish()?;
     let doubles = Doubles { n, changes: dir.join("changes"), vertices: dir.join("doubles") };
-    save(changes.finish()?, &doubles.changes)?;
+    save(changes.finish()?, &doubles.changes, |_| ())?;
     positions(mesh, &originals, &doubles.vertices)?;
-    pairs(&doubles, draft, out, n_vertices)?;
+    pairs(&doubles, outputs, out, n_vertices)?;
     split_faces(mesh, face_changes.finish()?)?;
     mesh.set_doubles(doubles);
     Ok(())
 }
 
-fn save<R: SortRecord>(records: Sorted<R>, path: &Path) -> Result<()> {
-    let mut stream = scratch(path)?;
-    for record in records {
-        stream.bytes(record?.to_bytes().as_ref());
-        stream.end()?;
-    }
-    stream.finish()
-}
-
 /// Tetrahedra and faces at vertices of sheets, by these. Memory: a bit for each vertex.
-fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<Corner>, Sorted<FaceCorner>)> {
-    let mut bits = vec![0u64; mesh.n_vertices().div_ceil(64) as usize];
+fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<TetCorner>, Sorted<FaceCorner>)> {
+    let mut on_sheet = BitSet::new(mesh.n_vertices());
     mesh.faces().each(|face| {
         if is_sheet(face) {
             for v in face.vertices {
-                bits[(v / 64) as usize] |= 1 << (v % 64);
+                on_sheet.insert(v);
             }
         }
         Ok(())
     })?;
-    let on_sheet = |v: u64| bits[(v / 64) as usize] >> (v % 64) & 1 == 1;
     let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
     let mut face_corners = Sorter::new(&dir, bytes);
     let mut number = 0;
     mesh.faces().each(|face| {
         let mut vertices = face.vertices;
         vertices.sort_unstable();
-        for vertex in vertices.into_iter().filter(|&v| on_sheet(v)) {
+        for vertex in vertices.into_iter().filter(|&v| on_sheet.contains(v)) {
             face_corners.push(FaceCorner {
                 vertex,
                 face: number,
@@ -144,8 +130,8 @@ fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<Corner>, Sorted<FaceCorner>)> 
     let mut corners = Sorter::new(&dir, bytes);
     let mut number = 0;
     mesh.tets(|tet| {
-        for vertex in tet.nodes.into_iter().filter(|&v| on_sheet(v)) {
-            corners.push(Corner {
+        for vertex in tet.nodes.into_iter().filter(|&v| on_sheet.contains(v)) {
+            corners.push(TetCorner {
                 vertex,
                 tet: number,
                 subdomain: tet.subdomain,
@@ -158,12 +144,12 @@ fn at_sheets(mesh: &mut Merged) -> Result<(Sorted<Corner>, Sorted<FaceCorner>)> 
     Ok((corners.finish()?, face_corners.finish()?))
 }
 
-fn is_sheet(face: &Face) -> bool {
+fn is_sheet(face: &MergedFace) -> bool {
     face.regions[0] != 0 && face.regions[0] == face.regions[1]
 }
 
-/// What stands for `vertex` in each of its tetrahedra: itself, or doubles that are numbered from `first` on.
-fn numbers_at(vertex: u64, tets: &[Corner], faces: &[FaceCorner], first: u64) -> Vec<u64> {
+/// The replacement of `vertex` in each of its tetrahedra: the vertex itself, or doubles numbered from `first` on.
+fn numbers_at(vertex: u64, tets: &[TetCorner], faces: &[FaceCorner], first: u64) -> Vec<u64> {
     let mut sides: Vec<([u64; 3], usize)> = Vec::with_capacity(3 * tets.len());
     for (i, tet) in tets.iter().enumerate() {
         for face in FACES {
@@ -177,7 +163,7 @@ fn numbers_at(vertex: u64, tets: &[Corner], faces: &[FaceCorner], first: u64) ->
     sides.sort_unstable();
     let is_wall = |side: &[u64; 3]| faces.iter().any(|f| f.is_sheet && f.vertices == *side);
     let mut apart: Vec<usize> = (0..tets.len()).collect();
-    // Bodies may touch at a vertex without any sheet, and go on doing so.
+    // Bodies that touch at a vertex without a sheet stay joined.
     let mut whole = apart.clone();
     for pair in sides.windows(2) {
         let [(a, i), (b, j)] = [pair[0], pair[1]];
@@ -191,7 +177,7 @@ fn numbers_at(vertex: u64, tets: &[Corner], faces: &[FaceCorner], first: u64) ->
     let mut next = first;
     let mut numbers = vec![vertex; tets.len()];
     for i in 0..tets.len() {
-        // Each class is called by its first member.
+        // Each class is named by its first member.
         numbers[i] = match apart[i] {
             class if class < i => numbers[class],
             _ if whole[i] == i => vertex,
@@ -204,7 +190,7 @@ fn numbers_at(vertex: u64, tets: &[Corner], faces: &[FaceCorner], first: u64) ->
     numbers
 }
 
-/// Makes one of two classes, each called by its least member.
+/// Joins two classes, each named by its least member.
 fn join(classes: &mut [usize], i: usize, j: usize) {
     let (low, high) = (classes[i].min(classes[j]), classes[i].max(classes[j]));
     if low != high {
@@ -212,9 +198,9 @@ fn join(classes: &mut [usize], i: usize, j: usize) {
     }
 }
 
-fn face_change(face: &FaceCorner, tets: &[Corner], numbers: &[u64]) -> Option<FaceChange> {
+fn face_change(face: &FaceCorner, tets: &[TetCorner], numbers: &[u64]) -> Option<FaceChange> {
     let front = tets.binary_search_by_key(&face.tet, |tet| tet.tet).ok()?;
-    let has = |tet: &Corner| face.vertices.iter().all(|v| tet.nodes.contains(v));
+    let has = |tet: &TetCorner| face.vertices.iter().all(|v| tet.nodes.contains(v));
     let mut others = tets.iter().enumerate().filter(|(i, tet)| *i != front && has(tet));
     let back = others.next().filter(|_| face.is_sheet);
     Some(FaceChange {
@@ -226,9 +212,9 @@ fn face_change(face: &FaceCorner, tets: &[Corner], numbers: &[u64]) -> Option<Fa
     })
 }
 
-/// Writes the doubles with all that their vertices have.
+/// Saves the doubles with the data of their vertices.
 fn positions(mesh: &mut Merged, originals: &Path, to: &Path) -> Result<()> {
-    let mut originals = Records::<8>::open(originals, 0)?;
+    let mut originals = RecordReader::open(originals, 0)?;
     let mut next = originals.next()?;
     let mut stream = scratch(to)?;
     mesh.vertices(|number, vertex| {
@@ -240,8 +226,7 @@ fn positions(mesh: &mut Merged, originals: &Path, to: &Path) -> Result<()> {
                 h: vertex.h.into(),
                 point: Payload(vertex.point),
             };
-            stream.bytes(&double.to_bytes());
-            stream.end()?;
+            stream.record(&double)?;
             next = originals.next()?;
         }
         Ok(())
@@ -250,10 +235,10 @@ fn positions(mesh: &mut Merged, originals: &Path, to: &Path) -> Result<()> {
 }
 
 /// `NAME_pairs.csv`: each double and the vertex it is of, counted from 0 in the order of the file.
-fn pairs(doubles: &Doubles, draft: &mut Draft, out: &Path, n_vertices: u64) -> Result<()> {
+fn pairs(doubles: &Doubles, outputs: &mut OutputFiles, out: &Path, n_vertices: u64) -> Result<()> {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
     let path = out.with_file_name(format!("{stem}_pairs.csv"));
-    let mut stream = Stream::open(&draft.create(&path, 20 * doubles.n)?)?;
+    let mut stream = Stream::open(&outputs.create(&path, 20 * doubles.n)?)?;
     stream.text("vertex,double\n");
     doubles.each(|place, double| {
         stream.integer(double.vertex, b',');
@@ -263,16 +248,15 @@ fn pairs(doubles: &Doubles, draft: &mut Draft, out: &Path, n_vertices: u64) -> R
     stream.finish()
 }
 
-/// Boundary faces with what stands for their vertices; those of sheets twice, the second time as their backs.
+/// Replaces the vertices of the boundary faces; those of sheets are written twice, the second time as their backs.
 fn split_faces(mesh: &mut Merged, changes: Sorted<FaceChange>) -> Result<()> {
-    let mut changes = changes.peekable();
+    let mut changes = MergeReader::new(changes);
     let mut number = 0;
     mesh.rewrite_faces(|face, put| {
         let mut back = *face;
         let mut face = *face;
         let mut back_tet = NONE;
-        while let Some(change) = changes.next_if(|c| here(c, |c| c.face == number)) {
-            let change = change?;
+        while let Some(change) = changes.next_if(|c| c.face == number)? {
             for i in 0..3 {
                 if back.vertices[i] == change.vertex && face.vertices[i] == change.vertex {
                     [face.vertices[i], back.vertices[i]] = change.sides;

@@ -1,11 +1,13 @@
-//! One file written front to back, and one array written into its place in a file.
+//! One file written front to back, one array written into its place in a file, and scratch files of records.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{BufReader, BufWriter, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
-use super::draft::STDOUT;
 use super::error::{Result, WriteError};
+use super::output_files::STDOUT;
+use tetdb_base::storage::{SortBytes, SortRecord, Sorted};
 
 /// Bytes gathered before a write.
 const BUFFER_BYTES: usize = 256 << 10;
@@ -14,7 +16,7 @@ const BUFFER_BYTES: usize = 256 << 10;
 pub(super) struct Stream {
     path: PathBuf,
     file: Box<dyn Write>,
-    /// Bytes that are.
+    /// Bytes written to the file so far.
     written: u64,
     buffer: Vec<u8>,
     integers: itoa::Buffer,
@@ -56,6 +58,12 @@ impl Stream {
         self.buffer.push(after);
     }
 
+    /// Numbers in decimal, `between` them one byte and `after` them another.
+    pub fn integers(&mut self, values: impl IntoIterator<Item = u64>, between: u8, after: u8) {
+        values.into_iter().for_each(|value| self.integer(value, between));
+        self.end_list(after);
+    }
+
     /// The shortest decimal that reads back as the same bits, and the byte after it. Coordinates are finite.
     pub fn double(&mut self, value: f64, after: u8) {
         let text = self.doubles.format(value);
@@ -63,13 +71,35 @@ impl Stream {
         self.buffer.push(after);
     }
 
-    /// Ends a record: what was gathered is written when it is enough.
+    /// Numbers as [`Stream::double`], `between` them one byte and `after` them another.
+    pub fn doubles(&mut self, values: impl IntoIterator<Item = f64>, between: u8, after: u8) {
+        values.into_iter().for_each(|value| self.double(value, between));
+        self.end_list(after);
+    }
+
+    fn end_list(&mut self, after: u8) {
+        *self.buffer.last_mut().expect("a list has a number") = after;
+    }
+
+    /// Numbers as bytes, little end first.
+    pub fn double_bytes(&mut self, values: impl IntoIterator<Item = f64>) {
+        values.into_iter().for_each(|x| self.bytes(&x.to_le_bytes()));
+    }
+
+    /// Ends a record: a full buffer is written.
     #[inline]
     pub fn end(&mut self) -> Result<()> {
         if self.buffer.len() < BUFFER_BYTES {
             return Ok(());
         }
         self.flush()
+    }
+
+    /// Writes a record of a scratch file.
+    #[inline]
+    pub fn record<R: SortRecord>(&mut self, record: &R) -> Result<()> {
+        self.bytes(record.to_bytes().as_ref());
+        self.end()
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -85,8 +115,8 @@ impl Stream {
             Err(source) if self.path != Path::new(STDOUT) => {
                 Err(WriteError::io(&self.path, source))
             }
-            Err(source) if source.kind() == std::io::ErrorKind::BrokenPipe => {
-                // Whoever reads has enough; what follows goes nowhere.
+            Err(source) if source.kind() == ErrorKind::BrokenPipe => {
+                // The reader has read enough; all that follows is dropped.
                 self.file = Box::new(std::io::sink());
                 Ok(())
             }
@@ -113,11 +143,8 @@ impl Strip {
         let io = |e| WriteError::io(path, e);
         let mut file = OpenOptions::new().write(true).open(path).map_err(io)?;
         file.seek(SeekFrom::Start(start)).map_err(io)?;
-        Ok(Self {
-            path: path.to_owned(),
-            out: BufWriter::with_capacity(BUFFER_BYTES, file),
-            left: bytes,
-        })
+        let out = BufWriter::with_capacity(BUFFER_BYTES, file);
+        Ok(Self { path: path.to_owned(), out, left: bytes })
     }
 
     #[inline]
@@ -135,55 +162,81 @@ impl Strip {
     }
 }
 
-/// Reads records of `N` bytes from a scratch file, from record `first` on; `None` at its end.
-pub(super) struct Records<const N: usize> {
+/// Reads records from a scratch file.
+pub(super) struct RecordReader<R> {
     path: PathBuf,
-    file: std::io::BufReader<File>,
+    file: BufReader<File>,
     /// Number of the next record.
     next: u64,
+    kind: PhantomData<R>,
 }
 
-impl<const N: usize> Records<N> {
+impl<R: SortRecord> RecordReader<R> {
+    const BYTES: u64 = size_of::<R::Bytes>() as u64;
+
+    /// Begins at record `first`. Errors: the disk.
     pub fn open(path: &Path, first: u64) -> Result<Self> {
         let io = |e| WriteError::io(path, e);
         let mut file = File::open(path).map_err(io)?;
-        file.seek(SeekFrom::Start(first * N as u64)).map_err(io)?;
-        Ok(Self {
-            path: path.to_owned(),
-            file: std::io::BufReader::with_capacity(BUFFER_BYTES, file),
-            next: first,
-        })
+        file.seek(SeekFrom::Start(first * Self::BYTES)).map_err(io)?;
+        let file = BufReader::with_capacity(BUFFER_BYTES, file);
+        Ok(Self { path: path.to_owned(), file, next: first, kind: PhantomData })
     }
 
-    /// Goes to record `record`; what is in the buffer already is not read again.
+    /// Goes to record `record`; the buffer is not read again. Errors: the disk.
     pub fn seek(&mut self, record: u64) -> Result<()> {
         let records = record.cast_signed() - self.next.cast_signed();
         self.next = record;
-        let moved = self.file.seek_relative(records * N as i64);
+        let moved = self.file.seek_relative(records * Self::BYTES as i64);
         moved.map_err(|e| WriteError::io(&self.path, e))
     }
 
-    pub fn next(&mut self) -> Result<Option<[u8; N]>> {
-        let mut record = [0; N];
+    /// The next record; `None` at the end. Errors: the disk.
+    pub fn next(&mut self) -> Result<Option<R>> {
+        let mut record = R::Bytes::ZERO;
         self.next += 1;
-        match self.file.read_exact(&mut record) {
-            Ok(()) => Ok(Some(record)),
-            Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),
+        match self.file.read_exact(record.as_mut()) {
+            Ok(()) => Ok(Some(R::from_bytes(&record))),
+            Err(e) if e.kind() == ErrorKind::UnexpectedEof => Ok(None),
             Err(e) => Err(WriteError::io(&self.path, e)),
         }
     }
+
+    /// Calls `each` with all records that are left. Errors: the disk, those of `each`.
+    pub fn each(mut self, mut each: impl FnMut(&R) -> Result<()>) -> Result<()> {
+        while let Some(record) = self.next()? {
+            each(&record)?;
+        }
+        Ok(())
+    }
+
+    /// Calls `each` with the next `n` records. Errors: the disk, those of `each`.
+    pub fn each_of(mut self, n: u64, mut each: impl FnMut(&R) -> Result<()>) -> Result<()> {
+        for _ in 0..n {
+            let Some(record) = self.next()? else { break };
+            each(&record)?;
+        }
+        Ok(())
+    }
 }
 
-/// A scratch file that does not exist yet.
+/// Begins a scratch file, which must not exist yet. Errors: the disk.
 pub(super) fn scratch(path: &Path) -> Result<Stream> {
     File::create_new(path).map_err(|e| WriteError::io(path, e))?;
     Stream::open(path)
 }
 
-/// Whether a record that was read is one that is looked for; errors are, to be seen.
-pub(super) fn here<R>(
-    record: &std::result::Result<R, tetdb_base::storage::StorageError>,
-    is: impl Fn(&R) -> bool,
-) -> bool {
-    record.as_ref().map_or(true, is)
+/// Writes sorted records to a new scratch file, each after a look at it. Errors: the disk.
+pub(super) fn save<R: SortRecord>(
+    records: Sorted<R>,
+    path: &Path,
+    mut look: impl FnMut(&R),
+) -> Result<()> {
+    let mut stream = scratch(path)?;
+    for record in records {
+        let record = record?;
+        look(&record);
+        stream.record(&record)?;
+    }
+    stream.finish()
 }

@@ -2,24 +2,24 @@
 
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::{Result, WriteError};
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 use tetdb_base::surface::{EmbeddedSet, Surface};
 
 /// A writer of one format.
 type Write = fn(&Surface, &mut Stream) -> Result<()>;
 
-/// What was written.
+/// The result of writing a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct SurfaceReport {
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// Whether the format has a place for the labels there are.
+    /// True if the format keeps the labels.
     pub labels_kept: bool,
 }
 
-/// Writes `surface` to `out` in the format its extension tells, replacing what is there.
+/// Writes `surface` to `out` in the format of its extension; replaces an existing file.
 ///
 /// `.stl` is text, because binary STL has single precision; `.stlb` is binary when nothing is rounded.
 /// `.ply` is binary with doubles. Errors: [`WriteError`]; `out` is not touched then.
@@ -41,12 +41,12 @@ pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceReport> {
             });
         }
     };
-    let mut draft = Draft::new(out)?;
-    let path = draft.create(out, 0)?;
+    let mut outputs = OutputFiles::new(out)?;
+    let path = outputs.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
     write(surface, &mut stream)?;
     stream.finish()?;
-    let files = draft.publish()?;
+    let files = outputs.publish()?;
     Ok(SurfaceReport {
         bytes: files.iter().map(|f| f.1).sum(),
         labels_kept: labels || surface.label_names.len() <= 1,
@@ -83,7 +83,7 @@ fn doubles(stream: &mut Stream, before: &str, [x, y, z]: [f64; 3]) {
     stream.double(z, b'\n');
 }
 
-/// Whether triangle `t` begins a run of its label.
+/// Returns whether triangle `t` begins a run of its label.
 fn begins_run(surface: &Surface, t: usize) -> bool {
     t == 0 || surface.labels[t] != surface.labels[t - 1]
 }
@@ -168,8 +168,8 @@ fn obj(surface: &Surface, stream: &mut Stream) -> Result<()> {
 ///
 /// Errors: [`WriteError`]; `out` is not touched then.
 pub fn wires(set: &EmbeddedSet, out: &Path) -> Result<()> {
-    let mut draft = Draft::new(out)?;
-    let path = draft.create(out, 0)?;
+    let mut outputs = OutputFiles::new(out)?;
+    let path = outputs.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
     for p in &set.points {
         doubles(&mut stream, "v ", p.to_array());
@@ -191,13 +191,13 @@ pub fn wires(set: &EmbeddedSet, out: &Path) -> Result<()> {
         stream.end()?;
     }
     stream.finish()?;
-    draft.publish()?;
+    outputs.publish()?;
     Ok(())
 }
 
 fn ply(surface: &Surface, stream: &mut Stream) -> Result<()> {
     stream.text("ply\nformat binary_little_endian 1.0\n");
-    // Where all triangles have one, a property of it says nothing, and some readers take lists of corners alone.
+    // A property of labels that are all equal is left out: some readers take lists of corners alone.
     let has_labels = surface.label_names.len() > 1;
     for (number, name) in surface.label_names.iter().enumerate() {
         let name = name.replace(['\n', '\r'], " ");

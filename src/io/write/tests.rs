@@ -307,7 +307,7 @@ fn two_subdomains_become_one_mesh_in_every_format() -> Outcome {
     for name in ["a.vtu", "a.mesh", "a.meshb", "a.msh", "a.inp"] {
         let out = dir.path().join(name);
         std::fs::write(&out, b"what was there before")?;
-        let report = export(&mut store, &out, &Selection::default(), 1 << 20, &quiet)?;
+        let report = export(&mut store, &out, &ExportSelection::default(), 1 << 20, &quiet)?;
         // Gmsh's file has the face between the two besides.
         let triangles = if name == "a.msh" { 7 } else { 6 };
         let found = (report.vertices, report.tets, report.triangles);
@@ -338,7 +338,7 @@ fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     cubes(&path, n)?;
     let mut store = Catalog::open(&path)?;
     let out = dir.path().join("c.vtu");
-    let report = export(&mut store, &out, &Selection::default(), 1 << 20, &quiet)?;
+    let report = export(&mut store, &out, &ExportSelection::default(), 1 << 20, &quiet)?;
     let counts = [(n + 1).pow(3), 6 * n.pow(3), 12 * n * n].map(u64::from);
     assert_eq!([report.vertices, report.tets, report.triangles], counts);
     let vtu = Vtu::read(&out)?;
@@ -362,8 +362,13 @@ fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     assert_eq!(ids[ids.len() / 2], 1 << 29);
     let ranks = vtu.numbers("CellData.subdomain", u32::from_le_bytes);
     assert_eq!(ranks.iter().sum::<u32>() as usize * 2, ranks.len());
-    let report =
-        export(&mut store, &dir.path().join("c.npy"), &Selection::default(), 1 << 20, &quiet)?;
+    let report = export(
+        &mut store,
+        &dir.path().join("c.npy"),
+        &ExportSelection::default(),
+        1 << 20,
+        &quiet,
+    )?;
     assert_eq!(report.files.len(), 10);
     let arrays = seen_in_npy(&dir.path().join("c"))?;
     assert_eq!(arrays, seen);
@@ -372,7 +377,7 @@ fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     let triangles = npy(&dir.path().join("c_triangles.npy"), "'<i4'", " 3")?;
     assert_eq!(triangles.len() as u64, 12 * report.triangles);
     let text = dir.path().join("c.mesh");
-    export(&mut store, &text, &Selection::default(), 1 << 20, &quiet)?;
+    export(&mut store, &text, &ExportSelection::default(), 1 << 20, &quiet)?;
     assert_eq!(seen_in_medit(&text)?.canonical(), seen.canonical());
     Ok(())
 }
@@ -388,7 +393,7 @@ fn boundaries_read_back_as_the_surface() -> Outcome {
         (0..s.n_triangles() as u32).map(corners).collect::<Vec<_>>()
     };
     let boundary = dir.path().join("b.vtu");
-    export(&mut store, &boundary, &Selection::default(), 1 << 20, &quiet)?;
+    export(&mut store, &boundary, &ExportSelection::default(), 1 << 20, &quiet)?;
     let vtu = Vtu::read(&dir.path().join("b_boundary.vtu"))?;
     let points = vtu.points();
     let nodes = vtu.numbers("Cells.connectivity", i32::from_le_bytes);
@@ -404,7 +409,7 @@ fn boundaries_read_back_as_the_surface() -> Outcome {
     for (name, format) in [("b.mesh", None), ("b.meshb", None), ("b.msh", Some(MeshFormat::Gmsh22))]
     {
         let out = dir.path().join(name);
-        let selection = Selection { format, ..Selection::default() };
+        let selection = ExportSelection { format, ..ExportSelection::default() };
         export(&mut store, &out, &selection, 1 << 20, &quiet)?;
         let surface = read_surface(&[out], 1 << 30)?;
         assert_eq!(triangles(&surface), expected, "{name}");
@@ -427,7 +432,7 @@ fn files_do_not_depend_on_the_memory() -> Outcome {
     let mut store = Catalog::open(&path)?;
     let names = ["m.vtu", "m.meshb", "m.inp", "m.vtkhdf", "m.msh", "m.foam", "m.mfem"];
     for (name, pieces) in names.iter().flat_map(|n| [(n, false), (n, true)]) {
-        let selection = Selection { pieces, ..Selection::default() };
+        let selection = ExportSelection { pieces, ..ExportSelection::default() };
         let mut files = Vec::new();
         for memory in [1 << 16, 64 << 20] {
             let report = export(&mut store, &dir.path().join(name), &selection, memory, &quiet)?;
@@ -449,11 +454,11 @@ fn a_surface_read_from_partitions_has_all_triangles_and_labels() -> Outcome {
     for (format, ascii) in
         [(MeshFormat::Gmsh22, false), (MeshFormat::Gmsh, false), (MeshFormat::Gmsh, true)]
     {
-        let selection = Selection {
+        let selection = ExportSelection {
             format: Some(format),
             ascii,
             ghosts: format == MeshFormat::Gmsh,
-            ..Selection::default()
+            ..ExportSelection::default()
         };
         let out = dir.path().join("s.msh");
         export(&mut store, &out, &selection, 1 << 20, &quiet)?;
@@ -481,10 +486,10 @@ fn pieces_are_the_same_written_together_or_alone() -> Outcome {
     for name in ["p.foam", "p.msh", "p.vtu"] {
         let mut written = BTreeMap::new();
         for subdomains in [vec![], vec![0], vec![1]] {
-            let selection = Selection {
+            let selection = ExportSelection {
                 subdomains: subdomains.into_iter().collect(),
                 pieces: true,
-                ..Selection::default()
+                ..ExportSelection::default()
             };
             let out = dir.path().join(name);
             let report = export(&mut store, &out, &selection, 1 << 20, &quiet)?;
@@ -530,7 +535,7 @@ fn partitions_by_several_writers_are_those_of_one() -> Outcome {
     let path = dir.path().join("cubes.tetdb");
     cubes(&path, 12)?;
     let out = |name: &str| dir.path().join(name);
-    let selection = Selection::default();
+    let selection = ExportSelection::default();
     assert!(selection.is_shared_file(MeshFormat::VtkHdf));
     let mut store = Catalog::open(&path)?;
     let alone = out("alone.vtkhdf");
@@ -563,18 +568,18 @@ fn partitions_by_several_writers_are_those_of_one() -> Outcome {
 #[test]
 fn what_a_format_cannot_hold_is_refused() -> Outcome {
     let dir = tempfile::tempdir()?;
-    let of = |name: &str, selection: Selection| {
+    let of = |name: &str, selection: ExportSelection| {
         let refused = check(&dir.path().join(name), &selection);
         refused.err().map(|error| error.code())
     };
-    let text = || Selection { ascii: true, ..Selection::default() };
-    let ghosts = |pieces| Selection { ghosts: true, pieces, ..Selection::default() };
+    let text = || ExportSelection { ascii: true, ..ExportSelection::default() };
+    let ghosts = |pieces| ExportSelection { ghosts: true, pieces, ..ExportSelection::default() };
     assert_eq!(of("a.vtu", text()), Some(Code::Usage));
     assert_eq!(of("a.msh", text()), None);
     assert_eq!(of("a.foam", ghosts(false)), Some(Code::Usage));
     assert_eq!(of("a.msh", ghosts(true)), None);
     assert_eq!(of("a.mfem", ghosts(false)), Some(Code::Usage));
-    let vtu = Selection { format: Some(MeshFormat::Vtu), ..Selection::default() };
+    let vtu = ExportSelection { format: Some(MeshFormat::Vtu), ..ExportSelection::default() };
     let to_stdout = check(Path::new("-"), &vtu);
     assert_eq!(to_stdout.err().ok_or("an error")?.code(), "usage");
     Ok(())
@@ -591,7 +596,7 @@ fn progress_ends_at_its_total() -> Outcome {
         export(
             &mut Catalog::open(&path)?,
             &dir.path().join(name),
-            &Selection::default(),
+            &ExportSelection::default(),
             1 << 20,
             &report,
         )?;
@@ -609,8 +614,13 @@ fn what_cannot_be_written_leaves_nothing() -> Outcome {
     two_subdomains(&path)?;
     let mut store = Catalog::open(&path)?;
     let mut code = |name: &str| {
-        let error =
-            export(&mut store, &dir.path().join(name), &Selection::default(), 1 << 20, &quiet);
+        let error = export(
+            &mut store,
+            &dir.path().join(name),
+            &ExportSelection::default(),
+            1 << 20,
+            &quiet,
+        );
         error.map(|_| "written").unwrap_or_else(|e| {
             assert!(!e.help().is_empty() && e.to_string().contains(name));
             e.code().as_str()
@@ -622,13 +632,13 @@ fn what_cannot_be_written_leaves_nothing() -> Outcome {
     assert_eq!(code("folder.vtu"), "io");
     std::fs::remove_file(path.join("subdomain-00001-g1.redb"))?;
     let error =
-        export(&mut store, &dir.path().join("a.vtu"), &Selection::default(), 1 << 20, &quiet);
+        export(&mut store, &dir.path().join("a.vtu"), &ExportSelection::default(), 1 << 20, &quiet);
     let error = error.err().ok_or("an error")?;
     assert_eq!(error.code(), "damaged");
     assert_eq!(std::fs::read_dir(dir.path())?.count(), 2, "store and folder");
-    let mut draft = draft::Draft::new(&dir.path().join("huge.vtu"))?;
+    let mut outputs = output_files::OutputFiles::new(&dir.path().join("huge.vtu"))?;
     if cfg!(unix) {
-        let error = draft.create(&dir.path().join("huge.vtu"), 1 << 60);
+        let error = outputs.create(&dir.path().join("huge.vtu"), 1 << 60);
         assert_eq!(error.err().ok_or("an error")?.code(), "disk-full");
     }
     Ok(())

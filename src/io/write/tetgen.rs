@@ -4,19 +4,19 @@
 
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 use tetdb_schema::record::tag;
 
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     mesh.expect_passes(1, 1);
     let (n_vertices, n_tets, n_faces) = (mesh.n_vertices(), mesh.n_tets(), mesh.n_faces());
-    // Most numbers have seven digits or more where the space matters.
+    // An estimate with numbers of seven digits, as in large meshes.
     let bytes = 60 * n_vertices + 40 * n_tets + 35 * n_faces;
     let mut begin = |ending: &str, bytes: u64, head: String| -> Result<Stream> {
-        let path = draft.create(&out.with_extension(ending), bytes)?;
+        let path = outputs.create(&out.with_extension(ending), bytes)?;
         let mut stream = Stream::open(&path)?;
         stream.text(&head);
         Ok(stream)
@@ -50,12 +50,12 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         faces.end()
     })?;
     faces.finish()?;
-    let wires = mesh.wires();
-    if wires.edges.is_empty() {
+    let embedded = mesh.embedded();
+    if embedded.edges.is_empty() {
         return Ok(());
     }
-    let mut edges = begin("edge", 0, format!("{} 1\n", wires.edges.len()))?;
-    for (number, (ends, label)) in (0u64..).zip(&wires.edges) {
+    let mut edges = begin("edge", 0, format!("{} 1\n", embedded.edges.len()))?;
+    for (number, (ends, label)) in (0u64..).zip(&embedded.edges) {
         edges.integer(number, b' ');
         ends.iter().for_each(|&v| edges.integer(v, b' '));
         edges.integer(u64::from(*label) + 1, b'\n');

@@ -1,4 +1,4 @@
-//! Who neighbors whom, for solvers that give each sub-domain to a process of its own.
+//! The neighbors of each sub-domain, for solvers that give each sub-domain to a process of its own.
 //!
 //! JSON. `subdomains`: `id`, `tets`, `vertices`, `neighbors` (`id`, `faces`). `pairs`: for each two sub-domains that share a vertex, `low` and
 //! `high`, their numbers; `vertices`, two lists of equal length with the number of each shared vertex in the one and in the other; `faces`, the same
@@ -7,21 +7,21 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::draft::Draft;
-use super::numbering::{Candidate, Source, candidates};
+use super::numbering::{Source, shareable_vertices};
+use super::output_files::OutputFiles;
 use super::stream::Stream;
 use super::{FileCounts, Result};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_schema::catalog::{NeighborRow, SubdomainRow};
-use tetdb_store::sealed::SealedError;
-use tetdb_store::store::{Catalog, StoreError};
+use tetdb_store::sealed::{MergeReader, SealedError};
+use tetdb_store::store::Catalog;
 
 sort_record! {
     /// A vertex of a pair of sub-domains, the lower rank first.
     struct SharedVertex {
         pair: [u32; 2],
         id: u64,
-        /// Its number in each.
+        /// Number of the vertex in each.
         numbers: [u32; 2],
     }
 }
@@ -31,7 +31,7 @@ sort_record! {
     struct SharedFace {
         pair: [u32; 2],
         cut: u32,
-        /// Its number in the cut.
+        /// Number of the face in the cut.
         index: u32,
         /// Seen from the higher rank.
         is_high: bool,
@@ -41,18 +41,18 @@ sort_record! {
 
 pub(super) fn write(
     store: &mut Catalog,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
     memory: usize,
 ) -> Result<FileCounts> {
     let rows = store.subdomains()?;
     let sources: Vec<Source> = rows.iter().cloned().map(Source::from).collect();
-    let dir = draft.dir().to_owned();
+    let dir = outputs.dir().to_owned();
     let vertices = shared_vertices(store, &sources, &dir, memory)?;
     let faces = shared_faces(store, &rows, &dir, memory)?;
     let neighbors: BTreeMap<u32, Vec<NeighborRow>> =
         (store.topology()?.into_iter()).map(|row| (row.subdomain, row.neighbors)).collect();
-    let path = draft.create(out, 0)?;
+    let path = outputs.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
     stream.text("{\"schema\": 1, \"subdomains\": [");
     for (i, row) in rows.iter().enumerate() {
@@ -76,28 +76,21 @@ pub(super) fn write(
     Ok(FileCounts::default())
 }
 
-/// For each pair its lists. Every pair with a face shares vertices, so that faces never run ahead.
+/// Writes the lists of each pair. Every pair with a face shares vertices, so each face meets its pair.
 fn pairs(
     store: &mut Catalog,
     stream: &mut Stream,
     vertices: Sorted<SharedVertex>,
     faces: Sorted<SharedFace>,
 ) -> Result<()> {
-    let mut vertices = vertices.peekable();
-    let mut faces = faces.peekable();
+    let (mut vertices, mut group) = (MergeReader::new(vertices), Vec::new());
+    let mut faces = MergeReader::new(faces);
     let mut before = "";
-    while let Some(first) = vertices.next() {
-        let first = first?;
-        let pair = first.pair;
-        let mut shared = first.numbers.map(|number| vec![number]);
-        while let Some(next) = vertices.next_if(|v| v.as_ref().is_ok_and(|v| v.pair == pair)) {
-            let [low, high] = next?.numbers;
-            shared[0].push(low);
-            shared[1].push(high);
-        }
+    while vertices.next_group(&mut group, |a, b| a.pair == b.pair)? {
+        let pair = group[0].pair;
+        let shared = [0, 1].map(|side| group.iter().map(|v| v.numbers[side]).collect());
         let mut tets = [Vec::new(), Vec::new()];
-        while let Some(next) = faces.next_if(|f| f.as_ref().is_ok_and(|f| f.pair == pair)) {
-            let next = next?;
+        while let Some(next) = faces.next_if(|face| face.pair == pair)? {
             tets[usize::from(next.is_high)].push(next.tet);
         }
         let [low, high] = pair;
@@ -121,31 +114,26 @@ fn pairs(
 }
 
 fn lists(stream: &mut Stream, lists: &[Vec<u32>; 2]) -> Result<()> {
-    stream.text("[[");
-    for (side, list) in lists.iter().enumerate() {
+    stream.text("[");
+    for (list, after) in lists.iter().zip([", ", "]"]) {
+        stream.text("[");
         for (i, &number) in list.iter().enumerate() {
-            let last = i + 1 == list.len();
-            stream.integer(u64::from(number), if last { b']' } else { b',' });
+            stream.text(if i == 0 { "" } else { "," });
+            stream.text(&number.to_string());
             stream.end()?;
         }
-        if list.is_empty() {
-            stream.text("]");
-        }
-        stream.text(if side == 0 { ", [" } else { "]" });
+        stream.text("]");
+        stream.text(after);
     }
     Ok(())
 }
 
 fn unequal(store: &mut Catalog, low: u32, high: u32) -> super::WriteError {
-    StoreError::Sealed(SealedError::Content {
-        path: store.dir().to_owned(),
-        subdomain: low,
-        what: format!("the faces shared with sub-domain {high} are not the same on both sides"),
-    })
-    .into()
+    let what = format!("the faces shared with sub-domain {high} are not the same on both sides");
+    SealedError::content(store.dir(), low, what).into()
 }
 
-/// Vertices by pair, those of one pair in an order that both sides know.
+/// Vertices by pair, those of one pair by id.
 fn shared_vertices(
     store: &mut Catalog,
     sources: &[Source],
@@ -153,30 +141,19 @@ fn shared_vertices(
     memory: usize,
 ) -> Result<Sorted<SharedVertex>> {
     let mut sorter = Sorter::new(dir, memory as u64 / 4);
-    let mut group: Vec<Candidate> = Vec::new();
-    let mut id = 0;
-    let mut hand_on = |group: &mut Vec<Candidate>, id: u64| -> Result<()> {
+    let mut by_id = MergeReader::new(shareable_vertices(store, sources, dir, memory)?);
+    let mut group = Vec::new();
+    while by_id.next_group(&mut group, |a, b| a.id == b.id)? {
         for (i, a) in group.iter().enumerate() {
             for b in &group[i + 1..] {
                 sorter.push(SharedVertex {
                     pair: [a, b].map(|v| sources[v.part as usize].row.rank),
-                    id,
+                    id: a.id,
                     numbers: [a.local, b.local],
                 })?;
             }
         }
-        group.clear();
-        Ok(())
-    };
-    for candidate in candidates(store, sources, dir, memory)? {
-        let candidate = candidate?;
-        if candidate.id != id {
-            hand_on(&mut group, id)?;
-            id = candidate.id;
-        }
-        group.push(candidate);
     }
-    hand_on(&mut group, id)?;
     Ok(sorter.finish()?)
 }
 

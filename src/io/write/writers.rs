@@ -1,25 +1,25 @@
-//! Several processes that write one file together, each a part of it.
+//! Processes that write one file together, each a part of it.
 
 use std::path::{Path, PathBuf};
 
 use super::selection::Share;
 use tetdb_base::storage::RemoteFailure;
 
-/// The processes. The first makes the file, announces where it is, and renames it when all have done their parts.
+/// The processes. The first creates the file, announces its place, and renames it when all parts are written.
 pub trait Writers {
-    /// Which of them this one is.
+    /// The share of this process.
     fn share(&self) -> Share;
-    /// The first says where the unfinished file is, its head written.
+    /// Called by the first process: sends the place of the unfinished file, whose head is written.
     fn announce(&self, file: &Path);
-    /// What the first has said; `None` when there will be no file.
+    /// Called by the others: receives the place of the file; `None` when there will be no file.
     fn hear(&self) -> Option<PathBuf>;
-    /// The others say how their part went.
+    /// Called by the others: sends the result of their part.
     fn say(&self, done: Result<(), RemoteFailure>);
-    /// The first waits until all others have. Errors: of any of them.
+    /// Called by the first process: waits for the results of all others. Errors: those of any other.
     fn wait(&self) -> Result<(), RemoteFailure>;
 }
 
-/// Whether what is written once is for this process to write.
+/// Returns whether this process writes the parts that are written once.
 pub(super) fn is_first(writers: Option<&dyn Writers>) -> bool {
     writers.is_none_or(|writers| writers.share().number == 1)
 }

@@ -1,16 +1,15 @@
 //! The mesh against its input: every triangle there, bit for bit, and nothing added on it.
 
-use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::{NO_TET, SealedFacet};
 
-use super::{Finding, Offender, Report};
+use super::{Finding, Report};
 use crate::sealed::Corner;
 use tetdb_base::surface::Surface;
 
-/// The input and what of it has been seen. Memory: three bits a triangle.
+/// The input, and its triangles found so far. Memory: three bits for each triangle.
 pub(super) struct Input<'a> {
     surface: &'a Surface,
-    /// Seen with a filled front, with a filled back, at all.
+    /// Bits of triangles found with a filled front, with a filled back, at all.
     seen: [Vec<u64>; 3],
     doubled: Vec<DoubledSide>,
 }
@@ -18,10 +17,10 @@ pub(super) struct Input<'a> {
 /// The number of a triangle, and which of its sides is filled twice.
 type DoubledSide = (u32, u8);
 
-/// The triangles that one part of the mesh has.
+/// The triangles of one part of the mesh.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
-pub(super) struct SeenTriangles {
-    /// Of words that are not all zero: which, and their bits as in [`Input`].
+pub(super) struct FoundTriangles {
+    /// Place and bits of the words that are not all zero, as in [`Input`].
     words: Vec<(u32, [u64; 3])>,
     doubled: Vec<DoubledSide>,
 }
@@ -40,23 +39,14 @@ fn get(bits: &[u64], at: usize) -> bool {
 
 /// The surface vertices of a facet's corners, where they are the input's.
 fn input_vertices(corners: &[Corner; 3]) -> [Option<u32>; 3] {
-    corners.each_ref().map(input_vertex)
-}
-
-/// The number in the input of a vertex that is of it.
-pub(super) fn input_vertex(corner: &Corner) -> Option<u32> {
-    let id = VertexId::from_number(corner.id)?;
-    (id.owner == Owner::Surface).then_some(id.index)
+    corners.each_ref().map(Corner::input_index)
 }
 
 /// Every vertex of a facet is the input's, whether the input is at hand or not.
 pub(super) fn check_owners(subdomain: u32, corners: &[Corner; 3], report: &mut Report) {
     if input_vertices(corners).contains(&None) {
-        let finding = Finding::AddedVertex;
-        report.find(finding, || {
-            let what = "a facet has a vertex that is not the input's";
-            Offender::new(finding, Some(subdomain), what).with_corners(corners)
-        });
+        let what = "a facet has a vertex that is not the input's";
+        report.find(Finding::AddedVertex, subdomain, what).with_corners(corners);
     }
 }
 
@@ -66,18 +56,18 @@ impl<'a> Input<'a> {
         Self { surface, seen: [(); 3].map(|()| vec![0; words]), doubled: Vec::new() }
     }
 
-    /// What was seen, for [`add`](Self::add) elsewhere.
-    pub(super) fn into_seen(self) -> SeenTriangles {
+    /// Returns the found triangles, for [`add`](Self::add) in another process.
+    pub(super) fn into_found(self) -> FoundTriangles {
         let word = |at: usize| (at as u32, self.seen.each_ref().map(|bits| bits[at]));
         let words = (0..self.seen[0].len()).map(word);
-        SeenTriangles {
+        FoundTriangles {
             words: words.filter(|(_, bits)| *bits != [0; 3]).collect(),
             doubled: self.doubled,
         }
     }
 
-    /// Adds what was seen of another part of the mesh.
-    pub(super) fn add(&mut self, other: SeenTriangles) {
+    /// Adds the triangles found in another part of the mesh.
+    pub(super) fn add(&mut self, other: FoundTriangles) {
         self.doubled.extend(other.doubled);
         for (at, bits) in other.words {
             for (side, more) in (0..).zip(bits) {
@@ -102,13 +92,9 @@ impl<'a> Input<'a> {
         corners: &[Corner; 3],
         report: &mut Report,
     ) {
-        let wrong = self.difference(facet, corners);
-        if let Some(what) = wrong {
-            let finding = Finding::NotAnInputTriangle;
-            report.find(finding, || {
-                let what = format!("the facet of input triangle {} {what}", facet.triangle);
-                Offender::new(finding, Some(subdomain), what).with_corners(corners)
-            });
+        if let Some(what) = self.difference(facet, corners) {
+            let what = format_args!("the facet of input triangle {} {what}", facet.triangle);
+            report.find(Finding::NotAnInputTriangle, subdomain, what).with_corners(corners);
         }
     }
 
@@ -139,7 +125,7 @@ impl<'a> Input<'a> {
         None
     }
 
-    /// Counts what was seen; names what is missing.
+    /// Counts the found triangles; reports the missing ones.
     pub(super) fn finish(mut self, report: &mut Report) {
         self.doubled.sort_unstable();
         for &(number, side) in &self.doubled {
@@ -178,11 +164,6 @@ impl<'a> Input<'a> {
     }
 
     fn report(&self, finding: Finding, number: usize, what: String, report: &mut Report) {
-        report.find(finding, || {
-            let mut offender = Offender::new(finding, None, what);
-            let points = self.surface.corners(number as u32);
-            offender.points = points.map(|p| p.to_array()).to_vec();
-            offender
-        });
+        report.find(finding, None, what).with_points(self.surface.corners(number as u32));
     }
 }

@@ -1,13 +1,12 @@
-//! The qualities of a mesh by kind of tetrahedron, to be set beside another mesh's.
+//! Qualities of a mesh by kind of tetrahedron, to be compared with another mesh's.
 //!
-//! Some tetrahedra are bad whoever made the mesh: those on an input triangle that lets none be better than q = 2, and those
-//! with four vertices on the surface. They are forced, and counted apart. Those with a vertex on an interface are counted apart too: they tell
-//! what the interfaces cost.
+//! Some tetrahedra are bad in every mesh of an input: those on an input triangle that allows none better than q = 2, and those
+//! with four vertices on the surface. These forced ones are counted apart. Tetrahedra with a vertex on an interface are counted apart too: they
+//! show the cost of interfaces.
 
-use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::NO_TET;
 
-use crate::sealed::{Corner, Shape, Subdomain, quality_bin};
+use crate::sealed::{BitSet, Shape, Subdomain, quality_bin};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::shape::is_forcing;
 use tetdb_schema::catalog::QUALITY_BINS;
@@ -45,11 +44,11 @@ pub struct Qualities {
     pub interface_faces: u64,
     /// All tetrahedra.
     pub all: Population,
-    /// Those the input does not force.
+    /// Tetrahedra that the input does not force to be bad.
     pub unforced: Population,
-    /// Those the input forces: all vertices are on the surface, or a facet is too badly shaped for a good tetrahedron.
+    /// Tetrahedra that the input forces: all vertices are on the surface, or a facet is too badly shaped for a good tetrahedron.
     pub forced: Population,
-    /// With a vertex on an interface.
+    /// Tetrahedra with a vertex on an interface.
     pub at_interface: Population,
 }
 
@@ -69,14 +68,14 @@ pub fn qualities(store: &mut Catalog, memory_bytes: usize) -> Result<Qualities, 
             let chunk = part.tet_chunk(chunk as u32)?;
             for (t, tet) in (chunk.first..).zip(&chunk.records) {
                 let corners = part.corners(tet.nodes)?;
-                let quality = Shape::of(corners.map(|c| c.point)).quality;
+                let quality = Shape::new(corners.map(|c| c.point)).quality;
                 found.all.add(quality);
-                if forced.has(t) || corners.iter().all(is_on_surface) {
+                if forced.contains(t.into()) || corners.iter().all(|c| c.input_index().is_some()) {
                     found.forced.add(quality);
                 } else {
                     found.unforced.add(quality);
                 }
-                if tet.nodes.into_iter().any(|v| at_interface.has(v)) {
+                if tet.nodes.into_iter().any(|v| at_interface.contains(v.into())) {
                     found.at_interface.add(quality);
                 }
             }
@@ -87,45 +86,24 @@ pub fn qualities(store: &mut Catalog, memory_bytes: usize) -> Result<Qualities, 
     Ok(found)
 }
 
-fn is_on_surface(corner: &Corner) -> bool {
-    VertexId::from_number(corner.id).is_some_and(|id| id.owner == Owner::Surface)
-}
-
-/// A set of numbers, one bit each.
-struct Bits(Vec<u64>);
-
-impl Bits {
-    fn new(n: u64) -> Self {
-        Self(vec![0; n.div_ceil(64) as usize])
-    }
-    fn add(&mut self, n: u32) {
-        self.0[n as usize / 64] |= 1 << (n % 64);
-    }
-    fn has(&self, n: u32) -> bool {
-        self.0[n as usize / 64] >> (n % 64) & 1 != 0
-    }
-}
-
-fn forced_by_face(part: &mut Subdomain) -> Result<Bits, StoreError> {
-    let mut forced = Bits::new(part.row().tets);
+fn forced_by_face(part: &mut Subdomain) -> Result<BitSet, StoreError> {
+    let mut forced = BitSet::new(part.row().tets);
     for chunk in 0..part.row().chunks[2] {
         for facet in part.facet_chunk(chunk)?.records {
             let corners = part.corners(facet.vertices)?;
             if is_forcing(corners.map(|c| c.point)) {
-                for tet in facet.tets.into_iter().filter(|&t| t != NO_TET) {
-                    forced.add(tet);
-                }
+                forced.insert_all(facet.tets.into_iter().filter(|&tet| tet != NO_TET));
             }
         }
     }
     Ok(forced)
 }
 
-fn interface_vertices(part: &mut Subdomain) -> Result<Bits, StoreError> {
-    let mut vertices = Bits::new(part.row().vertices);
+fn interface_vertices(part: &mut Subdomain) -> Result<BitSet, StoreError> {
+    let mut vertices = BitSet::new(part.row().vertices);
     for chunk in 0..part.row().chunks[3] {
         for face in part.interface_chunk(chunk)?.records {
-            face.vertices.into_iter().for_each(|v| vertices.add(v));
+            vertices.insert_all(face.vertices);
         }
     }
     Ok(vertices)

@@ -1,40 +1,40 @@
-//! Whatever cannot be read as it was written, all of it, with its places.
+//! All files and records that cannot be read as they were written, with their places.
 //!
-//! The mesh itself is read by [`verify`](super::verify), chunk by chunk; here every file that counts is, also those that are only kept:
+//! [`verify`](super::verify) reads the mesh itself, chunk by chunk. This module reads every file that counts, also kept ones:
 //! coarse snapshots, previous versions, stages.
 
 use crate::store::{Catalog, StoreError};
 use tetdb_base::storage::check_cancelled;
 use tetdb_schema::catalog::{CoarseRow, SubdomainRow};
 
-/// For chunks and what redb holds of a file.
+/// Memory for chunks and redb's cache.
 const MEMORY_BYTES: usize = 8 << 20;
-/// More are not listed.
+/// Greatest number of listed faults.
 const LISTED_MAX: usize = 1000;
 
-/// What is damaged in the files of sub-domains, coarse snapshots, previous versions and stages, in that order; nothing in a sound store.
+/// Lists the damage in the files of sub-domains, coarse snapshots, previous versions and stages, in that order.
 ///
-/// Errors: a damaged catalog, which tells what files there are; failures of the disk that are no damage.
+/// Errors: a damaged catalog, because it lists the files; failures of the disk that are no damage.
 pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
     let mut found = DamageFound(Vec::new());
     for row in store.subdomains()? {
-        found.of_part(store, row)?;
+        found.add_part(store, row)?;
     }
-    found.of_snapshots(store)?;
+    found.add_snapshots(store)?;
     Ok(found.0)
 }
 
-/// The same of the files that are no part of the mesh. Errors: as [`damage`].
-pub(super) fn damage_of_snapshots(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
+/// Lists the damage in the files that are no part of the mesh. Errors: as [`damage`].
+pub(super) fn snapshot_damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
     let mut found = DamageFound(Vec::new());
-    found.of_snapshots(store)?;
+    found.add_snapshots(store)?;
     Ok(found.0)
 }
 
 struct DamageFound(Vec<StoreError>);
 
 impl DamageFound {
-    /// Takes damage; hands other errors on. Whether there was none.
+    /// Lists damage; returns other errors. Returns whether there was no damage.
     fn note<T, E: Into<StoreError>>(&mut self, read: Result<T, E>) -> Result<bool, StoreError> {
         check_cancelled();
         match read.map_err(E::into) {
@@ -49,7 +49,7 @@ impl DamageFound {
         }
     }
 
-    /// Reads one after the other, until no more damage is listed: a count of chunks that was changed may be any. Whether all were sound.
+    /// Reads all chunks, until the list is full: a damaged count of chunks may be any number. Returns whether all were sound.
     fn all<T, E: Into<StoreError>>(
         &mut self,
         chunks: impl Iterator<Item = Result<T, E>>,
@@ -64,20 +64,20 @@ impl DamageFound {
         Ok(is_sound)
     }
 
-    fn of_snapshots(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
+    fn add_snapshots(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
         for row in store.coarse_snapshots()? {
-            self.of_snapshot(store, row)?;
+            self.add_snapshot(store, row)?;
         }
         for row in store.previous()? {
-            self.of_part(store, row)?;
+            self.add_part(store, row)?;
         }
         for stage in store.stages()? {
-            self.of_part(store, stage.row)?;
+            self.add_part(store, stage.row)?;
         }
         Ok(())
     }
 
-    fn of_part(&mut self, store: &mut Catalog, row: SubdomainRow) -> Result<(), StoreError> {
+    fn add_part(&mut self, store: &mut Catalog, row: SubdomainRow) -> Result<(), StoreError> {
         let [tets, vertices, facets, faces, ..] = row.chunks;
         let mut part = match store.open_row(row, MEMORY_BYTES) {
             Ok(part) => part,
@@ -87,24 +87,24 @@ impl DamageFound {
         is_sound &= self.all((0..tets).map(|chunk| part.tet_chunk(chunk)))?;
         is_sound &= self.all((0..facets).map(|chunk| part.facet_chunk(chunk)))?;
         is_sound &= self.all((0..faces).map(|chunk| part.interface_chunk(chunk)))?;
-        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
+        // Damage of chunks was reported with their places before; the tree between them remains.
         if is_sound {
             self.note(part.check())?;
         }
         Ok(())
     }
 
-    fn of_snapshot(&mut self, store: &mut Catalog, row: CoarseRow) -> Result<(), StoreError> {
-        let mut leaf = match store.open_coarse(row.rank, MEMORY_BYTES) {
-            Ok(leaf) => leaf,
+    fn add_snapshot(&mut self, store: &mut Catalog, row: CoarseRow) -> Result<(), StoreError> {
+        let mut snapshot = match store.open_coarse(row.rank, MEMORY_BYTES) {
+            Ok(snapshot) => snapshot,
             Err(error) => return self.note::<(), StoreError>(Err(error)).map(drop),
         };
-        let mut is_sound = self.all(leaf.vertices())?;
-        is_sound &= self.all(leaf.tets())?;
-        is_sound &= self.all(leaf.facets())?;
-        is_sound &= self.all(leaf.faces())?;
+        let mut is_sound = self.all(snapshot.vertices())?;
+        is_sound &= self.all(snapshot.tets())?;
+        is_sound &= self.all(snapshot.facets())?;
+        is_sound &= self.all(snapshot.faces())?;
         if is_sound {
-            self.note(leaf.check())?;
+            self.note(snapshot.check())?;
         }
         Ok(())
     }

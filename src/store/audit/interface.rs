@@ -1,13 +1,14 @@
 //! Interface faces: each in exactly two sub-domains, the same from both.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 
 use tetdb_schema::digest::Digest;
 use tetdb_schema::record::InterfaceFace;
 
-use super::{Finding, Offender, Report};
-use crate::sealed::Corner;
+use super::{Finding, Report};
+use crate::sealed::{Corner, MergeReader};
 use crate::store::StoreError;
 use tetdb_base::storage::{Sorter, StorageError, sort_record};
 use tetdb_schema::catalog::InterfaceRow;
@@ -22,7 +23,7 @@ sort_record! {
         other: u32,
         /// Vertex ids in their turn as seen from the lower side, the least first.
         ids: [u64; 3],
-        /// Of the mixes of the vertices' coordinates.
+        /// Sum of the mixes of the vertices' coordinates.
         sum: u64,
     }
 }
@@ -43,7 +44,7 @@ struct SharedFaces {
 }
 
 /// All interface faces of all sub-domains, and the digests by cut and pair, from either side.
-pub(super) struct Interfaces {
+pub(super) struct InterfaceAudit {
     sorter: Sorter<FaceSide>,
     /// From the lower and from the higher side.
     sides: BTreeMap<CutPair, [SharedFaces; 2]>,
@@ -56,7 +57,7 @@ pub(super) struct InterfaceSides {
     pairs: Vec<PairSides>,
 }
 
-/// Two sub-domains at a cut: how many faces they have there, and their digest, from the lower and from the higher side.
+/// Two sub-domains at a cut: number and digest of their faces there, from the lower and from the higher side.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
 struct PairSides {
     cut: u32,
@@ -67,24 +68,24 @@ struct PairSides {
 }
 
 impl CutPair {
-    fn of(row: &InterfaceRow) -> Self {
+    fn from_row(row: &InterfaceRow) -> Self {
         let &InterfaceRow { cut, low, high, .. } = row;
         Self { cut, low, high }
     }
 }
 
 impl SharedFaces {
-    fn of(row: &InterfaceRow) -> Self {
+    fn from_row(row: &InterfaceRow) -> Self {
         Self { count: row.faces, digest: Digest { lanes: row.digest } }
     }
 }
 
-impl Interfaces {
+impl InterfaceAudit {
     pub(super) fn new(dir: &Path, memory_bytes: usize) -> Self {
         Self { sorter: Sorter::new(dir, memory_bytes as u64), sides: BTreeMap::new() }
     }
 
-    /// A face of `subdomain`; its vertices are counter-clockwise seen from outside it.
+    /// Adds a face of `subdomain`, whose vertices are counter-clockwise seen from outside the sub-domain.
     pub(super) fn push(
         &mut self,
         subdomain: u32,
@@ -116,7 +117,7 @@ impl Interfaces {
         })
     }
 
-    /// What was pushed, for [`add`](Self::add) elsewhere. Memory: all of it. Errors: the disk.
+    /// Returns the pushed faces, for [`add`](Self::add) in another process. Memory: all of them. Errors: the disk.
     pub(super) fn into_sides(self) -> Result<InterfaceSides, StorageError> {
         let pairs = self.sides.into_iter();
         let pairs = pairs.map(|(CutPair { cut, low, high }, sides)| PairSides {
@@ -152,21 +153,12 @@ impl Interfaces {
         rows: &[InterfaceRow],
         report: &mut Report,
     ) -> Result<(), StoreError> {
-        let mut group: Vec<FaceSide> = Vec::new();
-        for side in self.sorter.finish()? {
-            let side = side?;
-            let is_other = |first: &FaceSide| (first.cut, first.index) != (side.cut, side.index);
-            if group.first().is_some_and(is_other) {
-                compare_sides(&group, report);
-                group.clear();
-            }
-            group.push(side);
-        }
-        if !group.is_empty() {
+        let (mut sides, mut group) = (MergeReader::new(self.sorter.finish()?), Vec::new());
+        while sides.next_group(&mut group, |a, b| (a.cut, a.index) == (b.cut, b.index))? {
             compare_sides(&group, report);
         }
         let mut expected: BTreeMap<CutPair, SharedFaces> =
-            rows.iter().map(|row| (CutPair::of(row), SharedFaces::of(row))).collect();
+            rows.iter().map(|row| (CutPair::from_row(row), SharedFaces::from_row(row))).collect();
         for (pair, sides) in self.sides {
             let row = expected.remove(&pair);
             if sides[0] != sides[1] || row != Some(sides[0]) {
@@ -183,29 +175,23 @@ impl Interfaces {
 fn compare_sides(group: &[FaceSide], report: &mut Report) {
     let [a, b] = group else {
         let count = group.len();
-        return unmatched(&group[0], format!("{count} faces instead of 2"), report);
+        return unmatched(&group[0], format_args!("{count} faces instead of 2"), report);
     };
     if a.subdomain != b.other || a.other != b.subdomain {
-        unmatched(a, "its sub-domains do not name each other".into(), report);
+        unmatched(a, "its sub-domains do not name each other", report);
     } else if (a.ids, a.sum) != (b.ids, b.sum) {
-        unmatched(a, "its vertices differ between the sides".into(), report);
+        unmatched(a, "its vertices differ between the sides", report);
     }
 }
 
-fn unmatched(side: &FaceSide, what: String, report: &mut Report) {
-    let finding = Finding::UnmatchedInterface;
-    report.find(finding, || {
-        let what = format!("face {} of cut {}: {what}", side.index, side.cut);
-        Offender::new(finding, Some(side.subdomain), what)
-    });
+fn unmatched(side: &FaceSide, what: impl Display, report: &mut Report) {
+    let what = format_args!("face {} of cut {}: {what}", side.index, side.cut);
+    report.find(Finding::UnmatchedInterface, side.subdomain, what);
 }
 
 fn differs(CutPair { cut, low, high }: CutPair, report: &mut Report) {
-    let finding = Finding::CatalogDiffers;
-    report.find(finding, || {
-        let what = format!(
-            "the interface of sub-domains {low} and {high} by cut {cut} is not what its row says"
-        );
-        Offender::new(finding, Some(low), what)
-    });
+    let what = format_args!(
+        "the interface of sub-domains {low} and {high} by cut {cut} is not what its row says"
+    );
+    report.find(Finding::CatalogDiffers, low, what);
 }

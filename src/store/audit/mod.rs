@@ -1,25 +1,24 @@
-//! The certificate of a finished store, from what is on disk alone.
+//! The certificate of a finished store, from the files on disk alone.
 //!
-//! # What is proved
-//! Let every tetrahedron have an exactly positive orientation, and let the faces cancel in pairs of
-//! opposite orientation but for those that are input triangles, each with the orientation of its
-//! filled side. Then the sum of the tetrahedra, as a chain, has the filled sides of the input as its
-//! boundary, and the number of tetrahedra over a generic point is the winding number of that boundary
-//! there: one inside, zero outside. So there is no overlap, no gap and no inverted tetrahedron, and
-//! local tests have shown it. It does not matter which of several equal faces cancels which, therefore
-//! faces are first matched inside each chunk, and only the open ones are sorted externally.
+//! # Proof
+//! Let every tetrahedron have an exactly positive orientation. Let the faces cancel in pairs of opposite orientation, except for input triangles,
+//! which have the orientation of their filled side. Then the sum of the tetrahedra, as a chain, has the filled sides of the input as its boundary.
+//! The number of tetrahedra over a generic point is the winding number of that boundary there: one inside, zero outside. So local tests show that
+//! there is no overlap, no gap and no inverted tetrahedron. Equal faces may cancel in any pairing. Therefore faces are first matched inside each
+//! chunk, and only the open ones are sorted externally.
 //!
-//! Sub-domains are looked at one by one, by whatever process; what is found of each is added up in their order.
+//! Sub-domains are verified one by one, by any process; their findings are added up in order.
 //!
-//! Reading order: [`Report`] (what is found), `claims` (facets say which tetrahedra they touch),
-//! `pass` (once through a sub-domain), `part_report` (what is found there), `pairing` (faces across chunks), `interface` (faces across
-//! sub-domains), `against` and `wires` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
+//! Reading order: [`Report`] (the findings), `pass` (once through a sub-domain), `mesh_sums` (sums over all), `part_report` (the findings of a sub-domain), `pairing` (faces
+//! across chunks), `interface` (faces across sub-domains), `against` and `embedded` (the input), `rows` (summaries and the catalog). `damage` lists
+//! everything that cannot be read.
 
 mod against;
-mod claims;
 mod compare;
 mod damage;
+mod embedded;
 mod interface;
+mod mesh_sums;
 mod options;
 mod pairing;
 mod part_report;
@@ -28,16 +27,15 @@ mod report;
 mod rows;
 #[cfg(test)]
 mod tests;
-mod wires;
 
 use std::path::{Path, PathBuf};
 
 pub use compare::{Population, Qualities, qualities};
 pub use damage::damage;
+pub use embedded::wire_bytes;
 pub use options::VerifyOptions;
 pub use part_report::PartReport;
 pub use report::{Finding, Level, Offender, Report};
-pub use wires::wire_bytes;
 
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::digest::Digest;
@@ -56,7 +54,7 @@ pub fn verify(
     surface: Option<&Surface>,
     options: &VerifyOptions,
 ) -> Result<Report, StoreError> {
-    let scratch = Scratch::new(&options.temp_dir)?;
+    let scratch = VerifyScratch::new(&options.temp_dir)?;
     let mut audit = pass::Audit::new(surface, options, &scratch.path, None);
     for row in store.subdomains()? {
         audit.subdomain(&mut store.open_row(row, options.memory_bytes / 4)?)?;
@@ -64,7 +62,7 @@ pub fn verify(
     end(store, audit)
 }
 
-/// Looks at the sub-domains of a verification: is given their rows, the apex for [`verify_part`], and who takes what was found of each, in the
+/// Verifies the sub-domains: gets their rows, the apex for [`verify_part`], and a function that takes the findings of each, in the
 /// order of the rows.
 pub type EachPart<'a> = &'a mut dyn FnMut(
     &[SubdomainRow],
@@ -72,14 +70,14 @@ pub type EachPart<'a> = &'a mut dyn FnMut(
     &mut dyn FnMut(PartReport) -> Result<(), StoreError>,
 ) -> Result<(), StoreError>;
 
-/// The same as [`verify`], sub-domains being looked at by `each`. Errors: also those of `each`.
+/// Like [`verify`], but `each` verifies the sub-domains. Errors: also those of `each`.
 pub fn verify_shared(
     store: &mut Catalog,
     surface: Option<&Surface>,
     options: &VerifyOptions,
     each: EachPart,
 ) -> Result<Report, StoreError> {
-    let scratch = Scratch::new(&options.temp_dir)?;
+    let scratch = VerifyScratch::new(&options.temp_dir)?;
     let rows = store.subdomains()?;
     let apex = apex(store, &rows, options);
     let mut audit = pass::Audit::new(surface, options, &scratch.path, apex);
@@ -95,23 +93,23 @@ fn apex(store: &mut Catalog, rows: &[SubdomainRow], options: &VerifyOptions) -> 
     Some(part.corners(facet.vertices).ok()?[0].point)
 }
 
-/// What a verification finds of one sub-domain. Errors: as [`verify`].
+/// Verifies one sub-domain. Errors: as [`verify`].
 pub fn verify_part(
     part: &mut Subdomain,
     apex: Option<Point>,
     surface: Option<&Surface>,
     options: &VerifyOptions,
 ) -> Result<PartReport, StoreError> {
-    let scratch = Scratch::new(&options.temp_dir)?;
+    let scratch = VerifyScratch::new(&options.temp_dir)?;
     let mut audit = pass::Audit::new(surface, options, &scratch.path, apex);
     audit.subdomain(part)?;
     audit.into_part()
 }
 
-/// What can be said of the whole alone.
+/// Ends a verification with the checks of the whole mesh.
 fn end(store: &mut Catalog, audit: pass::Audit) -> Result<Report, StoreError> {
-    // What is only kept is no part of the mesh, but who wants it one day must not learn of its damage then.
-    if let Some(first) = damage::damage_of_snapshots(store)?.into_iter().next() {
+    // Kept snapshots and stages are no part of the mesh, but their damage must be found before they are needed.
+    if let Some(first) = damage::snapshot_damage(store)?.into_iter().next() {
         return Err(first);
     }
     let interfaces = store.interfaces()?;
@@ -143,12 +141,12 @@ pub fn digest(store: &mut Catalog, memory_bytes: usize) -> Result<[Digest; 2], S
     Ok(both)
 }
 
-/// A folder that goes when it is dropped.
-struct Scratch {
+/// A folder that is removed when it is dropped.
+struct VerifyScratch {
     path: PathBuf,
 }
 
-impl Scratch {
+impl VerifyScratch {
     fn new(parent: &Path) -> Result<Self, StoreError> {
         use std::sync::atomic::{AtomicU32, Ordering};
         static NUMBER: AtomicU32 = AtomicU32::new(0);
@@ -159,9 +157,9 @@ impl Scratch {
     }
 }
 
-impl Drop for Scratch {
+impl Drop for VerifyScratch {
     fn drop(&mut self) {
-        // Nothing depends on it; a folder that stays is only untidy.
+        // A folder that cannot be removed is only untidy.
         let _ = std::fs::remove_dir_all(&self.path);
     }
 }

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
+use crate::sealed::MergeReader;
 use crate::store::StoreError;
 use tetdb_base::storage::{Sorter, StorageError, check_cancelled, sort_record};
 
 sort_record! {
     /// One side of a face.
-    pub(super) struct Side {
+    pub(super) struct OpenSide {
         /// Vertices ascending.
         pub face: [u32; 3],
         /// Face reference: 4 * tetrahedron + face.
@@ -16,14 +17,14 @@ sort_record! {
         pub apex: u32,
         pub region: u32,
         pub odd: bool,
-        /// Bits of `claims`: what makes the face required.
+        /// Bits: the reasons for which the face is required.
         pub mark: u8,
     }
 }
 
 /// Open sides under collection.
 pub(super) struct OpenSides {
-    sorter: Sorter<Side>,
+    sorter: Sorter<OpenSide>,
 }
 
 impl OpenSides {
@@ -31,26 +32,18 @@ impl OpenSides {
         Self { sorter: Sorter::new(dir, memory_bytes as u64) }
     }
 
-    pub(super) fn push(&mut self, side: &Side) -> Result<(), StorageError> {
+    pub(super) fn push(&mut self, side: &OpenSide) -> Result<(), StorageError> {
         self.sorter.push(*side)
     }
 
     /// Calls `visit` with the sides of each face, faces ascending.
     pub(super) fn for_each_face(
         self,
-        mut visit: impl FnMut(&[Side]) -> Result<(), StoreError>,
+        mut visit: impl FnMut(&[OpenSide]) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
-        let mut sides: Vec<Side> = Vec::new();
-        for side in self.sorter.finish()? {
+        let (mut reader, mut sides) = (MergeReader::new(self.sorter.finish()?), Vec::new());
+        while reader.next_group(&mut sides, |a, b| a.face == b.face)? {
             check_cancelled();
-            let side = side?;
-            if sides.first().is_some_and(|s| s.face != side.face) {
-                visit(&sides)?;
-                sides.clear();
-            }
-            sides.push(side);
-        }
-        if !sides.is_empty() {
             visit(&sides)?;
         }
         Ok(())

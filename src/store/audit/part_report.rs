@@ -1,36 +1,36 @@
-//! What was found of one sub-domain, by whatever process: to be added to what was found of the others.
+//! The findings of one sub-domain, to be added to those of the others by any process.
 
 use super::Report;
-use super::against::SeenTriangles;
+use super::against::FoundTriangles;
+use super::embedded::FoundEmbedded;
 use super::interface::InterfaceSides;
-use super::wires::SeenWires;
 
-/// What was found of one sub-domain. Memory: its interface faces, and bits for its facets.
+/// The findings of one sub-domain. Memory: its interface faces, and bits for its facets.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
 pub struct PartReport {
     pub(super) report: Report,
     pub(super) digests: [[u64; 2]; 2],
     /// Region, tetrahedra, volume.
     pub(super) regions: Vec<(u32, u64, f64)>,
-    pub(super) volumes: Volumes,
+    pub(super) volumes: MeshVolumes,
     pub(super) interfaces: InterfaceSides,
-    /// Where there is an input to compare with.
-    pub(super) triangles: Option<SeenTriangles>,
-    pub(super) wires: Option<SeenWires>,
+    /// `None` without an input to compare with.
+    pub(super) triangles: Option<FoundTriangles>,
+    pub(super) embedded: Option<FoundEmbedded>,
 }
 
 /// Volumes of a sub-domain, or the sums of those of several.
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug, Default)]
-pub(super) struct Volumes {
+pub(super) struct MeshVolumes {
     pub of_tets: f64,
     pub within_boundary: f64,
-    /// Sum of the absolute values of what the volume within the boundary is made of.
+    /// Sum of the absolute values of the summands of the volume within the boundary.
     pub scale: f64,
-    /// What rounding of those values adds up to at most: of needles and thin plates, more than the tolerance.
+    /// Bound of the rounding of these summands; for needles and thin plates it exceeds the tolerance.
     pub rounding: f64,
 }
 
-impl Volumes {
+impl MeshVolumes {
     pub fn and(&self, next: &Self) -> Self {
         Self {
             of_tets: self.of_tets + next.of_tets,

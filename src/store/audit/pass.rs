@@ -8,48 +8,48 @@ use tetdb_schema::digest::Digest;
 use tetdb_schema::record::{FACES, NO_TET, SealedTet};
 
 use super::against::{Input, check_owners};
-use super::claims::{Claims, FACET, INTERFACE, SortedClaims};
-use super::interface::Interfaces;
-use super::pairing::{OpenSides, Side};
-use super::part_report::{PartReport, Volumes};
-use super::rows::{Rederived, RegionSums, check_regions};
-use super::wires::WireSearch;
-use super::{Finding, Level, Offender, Report, VerifyOptions};
-use crate::sealed::SealedError;
-use crate::sealed::{Corner, FacePairs, Paired, Subdomain, sorted_face};
+use super::embedded::EmbeddedSearch;
+use super::interface::InterfaceAudit;
+use super::pairing::{OpenSide, OpenSides};
+use super::part_report::MeshVolumes;
+use super::rows::{Rederived, RegionSums};
+use super::{Finding, Level, Report, VerifyOptions};
+use crate::sealed::{
+    BitSet, Corner, FaceJoin, FaceJoinSorter, FacePairs, Paired, Subdomain, sorted_face,
+};
 use crate::store::StoreError;
 use tetdb_base::geom::{Point, insphere, orient};
 use tetdb_base::storage::{check_cancelled, parallel};
-use tetdb_schema::catalog::{InterfaceRow, RegionRow};
 
-/// Volumes that agree this well, relative to the sum of what was added, are the same: sums of
-/// millions of terms lose some six of sixteen digits at most.
-const VOLUME_TOLERANCE: f64 = 1e-9;
+/// Marks of faces: the reasons for which a face is required.
+const FACET: u8 = 1;
+/// See [`FACET`].
+const INTERFACE: u8 = 2;
 
 /// A verification under way.
 pub(super) struct Audit<'a> {
-    options: &'a VerifyOptions,
-    scratch: &'a Path,
-    input: Option<Input<'a>>,
-    wires: Option<WireSearch<'a>>,
-    interfaces: Interfaces,
-    pairs: FacePairs,
-    report: Report,
-    digests: [Digest; 2],
-    regions: RegionSums,
-    volumes: Volumes,
-    /// The first corner of the boundary: seen from near, cones do not cancel.
-    apex: Option<Point>,
+    pub(super) options: &'a VerifyOptions,
+    pub(super) scratch: &'a Path,
+    pub(super) input: Option<Input<'a>>,
+    pub(super) embedded: Option<EmbeddedSearch<'a>>,
+    pub(super) interfaces: InterfaceAudit,
+    pub(super) pairs: FacePairs,
+    pub(super) report: Report,
+    pub(super) digests: [Digest; 2],
+    pub(super) regions: RegionSums,
+    pub(super) volumes: MeshVolumes,
+    /// First corner of the boundary, from which cones to the facets are measured: a distant apex would cancel digits.
+    pub(super) apex: Option<Point>,
 }
 
-/// Two faces of a chunk that are one.
-struct Pair {
+/// The two sides of a face in a chunk.
+struct FacePair {
     a: u32,
     b: u32,
 }
 
 impl<'a> Audit<'a> {
-    /// `apex`: the first corner of the boundary, where the first sub-domains are looked at elsewhere.
+    /// `apex`: the first corner of the boundary, where other processes read the first sub-domains.
     pub(super) fn new(
         surface: Option<&'a tetdb_base::surface::Surface>,
         options: &'a VerifyOptions,
@@ -62,27 +62,27 @@ impl<'a> Audit<'a> {
             options,
             scratch,
             input: surface.map(Input::new),
-            wires: surface.and_then(WireSearch::new),
-            interfaces: Interfaces::new(scratch, options.memory_bytes / 16),
+            embedded: surface.and_then(EmbeddedSearch::new),
+            interfaces: InterfaceAudit::new(scratch, options.memory_bytes / 16),
             pairs: FacePairs::new(SealedTet::COUNT_MAX),
             report,
             digests: [Digest::default(); 2],
             regions: RegionSums::new(),
-            volumes: Volumes::default(),
+            volumes: MeshVolumes::default(),
             apex,
         }
     }
 
-    fn level(&self, level: Level) -> bool {
+    pub(super) fn level(&self, level: Level) -> bool {
         self.options.level >= level
     }
 
     pub(super) fn subdomain(&mut self, part: &mut Subdomain) -> Result<(), StoreError> {
-        // Summed by itself, for sums must not depend on who looked at which.
+        // Summed separately: sums must not depend on the process that read a sub-domain.
         let others = std::mem::take(&mut self.volumes);
         self.walk(part)?;
         self.volumes = others.and(&self.volumes);
-        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
+        // Damage of chunks was reported with their places before; the tree between them remains.
         Ok(part.check()?)
     }
 
@@ -94,22 +94,18 @@ impl<'a> Audit<'a> {
         report.vertices += row.vertices;
         report.facets += row.facets;
         report.interface_faces += row.interface_faces;
-        let mut used = vec![0u64; (row.vertices as usize).div_ceil(64)];
+        let mut used = BitSet::new(row.vertices);
         let mut claims = self.facets(part, &mut used)?;
         let digest = self.tets(part, &mut claims, &mut used)?;
         while let Some(claim) = claims.next_below(u32::MAX)? {
-            self.stray(part, claim.tet, &claim.face)?;
+            self.stray(part, claim.tet, &claim.vertices)?;
         }
         self.unused(part, &used)?;
         if digest[0].lanes != row.digest || digest[1].lanes != row.interface_digest {
-            let finding = Finding::CatalogDiffers;
-            self.report.find(finding, || {
-                let what = format!(
-                    "the digests are {} and {}, not those of the catalog",
-                    digest[0], digest[1]
-                );
-                Offender::new(finding, Some(row.rank), what)
-            });
+            let [own, interface] = digest;
+            let what =
+                format_args!("the digests are {own} and {interface}, not those of the catalog");
+            self.report.find(Finding::CatalogDiffers, row.rank, what);
         }
         for (sum, part) in self.digests.iter_mut().zip(digest) {
             sum.merge(&part);
@@ -117,14 +113,10 @@ impl<'a> Audit<'a> {
         Ok(())
     }
 
-    /// Reads facets; returns what they and the interface faces say of tetrahedra.
-    fn facets(
-        &mut self,
-        part: &mut Subdomain,
-        used: &mut [u64],
-    ) -> Result<SortedClaims, StoreError> {
+    /// Reads facets and interface faces; returns the faces that they name of tetrahedra.
+    fn facets(&mut self, part: &mut Subdomain, used: &mut BitSet) -> Result<FaceJoin, StoreError> {
         let rank = part.id().rank();
-        let mut claims = Claims::new(self.scratch, self.options.memory_bytes / 8);
+        let mut claims = FaceJoinSorter::new(self.scratch, self.options.memory_bytes as u64 / 8);
         let (chunks, total) = (part.row().chunks[2], part.row().facets);
         let mut n = 0;
         for chunk in 0..chunks {
@@ -132,10 +124,10 @@ impl<'a> Audit<'a> {
             for facet in part.facet_chunk(chunk)?.records {
                 n += 1;
                 let corners = part.corners(facet.vertices)?;
-                mark(used, &facet.vertices);
+                used.insert_all(facet.vertices);
                 for (side, tet) in facet.tets.into_iter().enumerate() {
                     if tet != NO_TET {
-                        claims.push(tet, facet.vertices, side == 0, FACET)?;
+                        claims.push(tet, facet.vertices, side == 0, FACET.into())?;
                     }
                 }
                 if self.level(Level::Geometry) {
@@ -155,7 +147,7 @@ impl<'a> Audit<'a> {
     fn interface_faces(
         &mut self,
         part: &mut Subdomain,
-        claims: &mut Claims,
+        claims: &mut FaceJoinSorter,
     ) -> Result<(), StoreError> {
         let rank = part.id().rank();
         let (chunks, total) = (part.row().chunks[3], part.row().interface_faces);
@@ -164,7 +156,7 @@ impl<'a> Audit<'a> {
             for face in part.interface_chunk(chunk)?.records {
                 n += 1;
                 let corners = part.corners(face.vertices)?;
-                claims.push(face.tet, face.vertices, false, INTERFACE)?;
+                claims.push(face.tet, face.vertices, false, INTERFACE.into())?;
                 self.interfaces.push(rank, &face, &corners)?;
             }
         }
@@ -187,8 +179,8 @@ impl<'a> Audit<'a> {
     fn tets(
         &mut self,
         part: &mut Subdomain,
-        claims: &mut SortedClaims,
-        used: &mut [u64],
+        claims: &mut FaceJoin,
+        used: &mut BitSet,
     ) -> Result<[Digest; 2], StoreError> {
         let rank = part.id().rank();
         let mut digest = [Digest::default(); 2];
@@ -200,24 +192,19 @@ impl<'a> Audit<'a> {
             let chunk = part.tet_chunk(place as u32)?;
             let summary = part.tet_summaries()[place];
             if chunk.first != expected {
-                return Err(StoreError::Sealed(SealedError::Content {
-                    path: part.path().to_owned(),
-                    subdomain: rank,
-                    what: format!(
-                        "a chunk of tetrahedra starts at {}, expected {expected}",
-                        chunk.first
-                    ),
-                }));
+                let found = chunk.first;
+                let what = format!("a chunk of tetrahedra starts at {found}, expected {expected}");
+                return Err(part.damaged(what).into());
             }
             expected += chunk.records.len() as u32;
             let tets = &chunk.records;
             let mut corners = Vec::with_capacity(tets.len());
             for (i, tet) in tets.iter().enumerate() {
                 let c = part.corners(tet.nodes)?;
-                mark(used, &tet.nodes);
+                used.insert_all(tet.nodes);
                 self.distinct(rank, chunk.first + i as u32, tet, &c);
-                if let Some(wires) = &mut self.wires {
-                    wires.see(&c);
+                if let Some(embedded) = &mut self.embedded {
+                    embedded.see(&c);
                 }
                 corners.push(c);
             }
@@ -247,32 +234,26 @@ impl<'a> Audit<'a> {
     fn distinct(&mut self, rank: u32, number: u32, tet: &SealedTet, corners: &[Corner; 4]) {
         let [a, b, c, d] = tet.nodes;
         if a == b || a == c || a == d || b == c || b == d || c == d {
-            let finding = Finding::RepeatedNode;
-            self.report.find(finding, || {
-                Offender::new(finding, Some(rank), "two nodes are the same")
-                    .with_tet(number)
-                    .with_corners(corners)
-            });
+            let found = self.report.find(Finding::RepeatedNode, rank, "two nodes are the same");
+            found.with_tet(number).with_corners(corners);
         }
     }
 
-    /// What makes each face of a chunk required; findings where a claim is false.
+    /// Marks the required faces of a chunk; reports facets and interface faces that are no faces of their tetrahedra.
     fn marks(
         &mut self,
         part: &mut Subdomain,
-        claims: &mut SortedClaims,
+        claims: &mut FaceJoin,
         first: u32,
         tets: &[SealedTet],
     ) -> Result<Vec<[u8; 4]>, StoreError> {
         let mut marks = vec![[0; 4]; tets.len()];
         while let Some(claim) = claims.next_below(first + tets.len() as u32)? {
             let place = (claim.tet - first) as usize;
-            let nodes = tets[place].nodes;
-            let face = (0..4)
-                .find(|&i| sorted_face(FACES[i].map(|k| nodes[k])) == (claim.face, claim.odd));
-            match face {
-                Some(i) if marks[place][i] & claim.kind == 0 => marks[place][i] |= claim.kind,
-                _ => self.stray(part, claim.tet, &claim.face)?,
+            let mark = claim.mark as u8;
+            match claim.place(tets[place].nodes) {
+                Some(i) if marks[place][i] & mark == 0 => marks[place][i] |= mark,
+                _ => self.stray(part, claim.tet, &claim.vertices)?,
             }
         }
         Ok(marks)
@@ -281,13 +262,9 @@ impl<'a> Audit<'a> {
     fn stray(&mut self, part: &mut Subdomain, tet: u32, face: &[u32; 3]) -> Result<(), StoreError> {
         let corners = part.corners(*face)?;
         if self.level(Level::Topology) {
-            let finding = Finding::StrayFacet;
-            self.report.find(finding, || {
-                let what = "the tetrahedron named by a facet or interface face does not have it on that side, or is named twice";
-                Offender::new(finding, Some(part.id().rank()), what)
-                    .with_tet(tet)
-                    .with_corners(&corners)
-            });
+            let what = "the tetrahedron named by a facet or interface face does not have it on that side, or is named twice";
+            let found = self.report.find(Finding::StrayFacet, part.id().rank(), what);
+            found.with_tet(tet).with_corners(&corners);
         }
         Ok(())
     }
@@ -306,12 +283,9 @@ impl<'a> Audit<'a> {
         for (i, &six_volumes) in volumes.iter().enumerate() {
             self.volumes.of_tets += six_volumes / 6.0;
             if six_volumes <= 0.0 {
-                let finding = Finding::NotPositive;
-                self.report.find(finding, || {
-                    Offender::new(finding, Some(rank), "its orientation is not positive")
-                        .with_tet(first + i as u32)
-                        .with_corners(&corners[i])
-                });
+                let what = "its orientation is not positive";
+                let found = self.report.find(Finding::NotPositive, rank, what);
+                found.with_tet(first + i as u32).with_corners(&corners[i]);
             }
         }
     }
@@ -335,7 +309,7 @@ impl<'a> Audit<'a> {
                 let reference = (t * 4 + i) as u32;
                 match self.pairs.add(key, odd, reference) {
                     Paired::Open => {}
-                    Paired::With(other) => inner.push(Pair { a: other, b: reference }),
+                    Paired::With(other) => inner.push(FacePair { a: other, b: reference }),
                     Paired::Same(_) | Paired::Third => {
                         let c = face.map(|k| corners[t][k]);
                         self.crowded(rank, first + t as u32, &c);
@@ -346,7 +320,7 @@ impl<'a> Audit<'a> {
         for (key, odd, reference) in self.pairs.open() {
             let (t, i) = (reference as usize / 4, reference as usize % 4);
             n_open += 1;
-            open.push(&Side {
+            open.push(&OpenSide {
                 face: key,
                 odd,
                 reference: first * 4 + reference,
@@ -356,14 +330,10 @@ impl<'a> Audit<'a> {
             })?;
         }
         if n_open != summary.open_faces {
-            let finding = Finding::CatalogDiffers;
-            self.report.find(finding, || {
-                let what = format!(
-                    "a chunk has {n_open} open faces, its summary counts {}",
-                    summary.open_faces
-                );
-                Offender::new(finding, Some(rank), what).with_tet(first)
-            });
+            let counted = summary.open_faces;
+            let what =
+                format_args!("a chunk has {n_open} open faces, its summary counts {counted}");
+            self.report.find(Finding::CatalogDiffers, rank, what).with_tet(first);
         }
         self.report.inner_faces += inner.len() as u64;
         for pair in &inner {
@@ -393,14 +363,12 @@ impl<'a> Audit<'a> {
     }
 
     fn crowded(&mut self, rank: u32, tet: u32, corners: &[Corner; 3]) {
-        let finding = Finding::CrowdedFace;
-        self.report.find(finding, || {
-            let what = "more than one tetrahedron on one side of a face";
-            Offender::new(finding, Some(rank), what).with_tet(tet).with_corners(corners)
-        });
+        let what = "more than one tetrahedron on one side of a face";
+        let found = self.report.find(Finding::CrowdedFace, rank, what);
+        found.with_tet(tet).with_corners(corners);
     }
 
-    /// The two sides of an inner face: the same marks, none of them an interface's, and the same region where there are none.
+    /// Checks the two sides of an inner face: equal marks, none of an interface, and equal regions where there are none.
     fn agree(
         &mut self,
         rank: u32,
@@ -425,13 +393,11 @@ impl<'a> Audit<'a> {
         } else {
             return;
         };
-        self.report.find(finding, || {
-            Offender::new(finding, Some(rank), what).with_tet(tet).with_corners(corners)
-        });
+        self.report.find(finding, rank, what).with_tet(tet).with_corners(corners);
     }
 
-    /// A face that its chunk left open, with all its sides.
-    fn open_face(&mut self, part: &mut Subdomain, sides: &[Side]) -> Result<(), StoreError> {
+    /// Checks a face that its chunk left open, with all its sides.
+    fn open_face(&mut self, part: &mut Subdomain, sides: &[OpenSide]) -> Result<(), StoreError> {
         let rank = part.id().rank();
         let tet = sides[0].reference / 4;
         match sides {
@@ -441,13 +407,9 @@ impl<'a> Audit<'a> {
                 }
                 if one.mark == 0 {
                     let corners = part.corners(one.face)?;
-                    let finding = Finding::OpenFace;
-                    self.report.find(finding, || {
-                        let what = "a face with one side is neither a facet nor an interface face";
-                        Offender::new(finding, Some(rank), what)
-                            .with_tet(tet)
-                            .with_corners(&corners)
-                    });
+                    let what = "a face with one side is neither a facet nor an interface face";
+                    let found = self.report.find(Finding::OpenFace, rank, what);
+                    found.with_tet(tet).with_corners(&corners);
                 }
             }
             [a, b] if a.odd != b.odd => {
@@ -472,108 +434,24 @@ impl<'a> Audit<'a> {
         Ok(())
     }
 
-    fn unused(&mut self, part: &mut Subdomain, used: &[u64]) -> Result<(), StoreError> {
+    fn unused(&mut self, part: &mut Subdomain, used: &BitSet) -> Result<(), StoreError> {
         for v in 0..part.row().vertices as u32 {
-            if used[v as usize / 64] >> (v % 64) & 1 == 0 {
+            if !used.contains(v.into()) {
                 let corner = part.corner(v)?;
-                let finding = Finding::UnusedVertex;
-                self.report.find(finding, || {
-                    let what = "no tetrahedron and no facet has the vertex";
-                    Offender::new(finding, Some(part.id().rank()), what).with_corners(&[corner])
-                });
+                let what = "no tetrahedron and no facet has the vertex";
+                let found = self.report.find(Finding::UnusedVertex, part.id().rank(), what);
+                found.with_corners(&[corner]);
             }
         }
         Ok(())
-    }
-
-    /// What was found, for [`add`](Self::add) elsewhere. Errors: the disk.
-    pub(super) fn into_part(mut self) -> Result<PartReport, StoreError> {
-        Ok(PartReport {
-            digests: self.digests.map(|digest| digest.lanes),
-            regions: (self.regions.iter())
-                .map(|(&region, sum)| (region, sum.tets, sum.volume))
-                .collect(),
-            volumes: self.volumes,
-            interfaces: self.interfaces.into_sides()?,
-            triangles: self.input.take().map(Input::into_seen),
-            wires: self.wires.take().map(WireSearch::into_seen),
-            report: self.report,
-        })
-    }
-
-    /// Adds what was found of the next sub-domain. Errors: the disk.
-    pub(super) fn add(&mut self, part: PartReport) -> Result<(), StoreError> {
-        self.report.add(part.report);
-        for (sum, lanes) in self.digests.iter_mut().zip(part.digests) {
-            sum.merge(&Digest { lanes });
-        }
-        for (region, tets, volume) in part.regions {
-            let sum = self.regions.entry(region).or_default();
-            sum.tets += tets;
-            sum.volume += volume;
-        }
-        self.volumes = self.volumes.and(&part.volumes);
-        self.interfaces.add(part.interfaces)?;
-        if let (Some(input), Some(seen)) = (&mut self.input, part.triangles) {
-            input.add(seen);
-        }
-        if let (Some(wires), Some(seen)) = (&mut self.wires, part.wires) {
-            wires.add(&seen);
-        }
-        Ok(())
-    }
-
-    pub(super) fn finish(
-        mut self,
-        interfaces: &[InterfaceRow],
-        regions: &[RegionRow],
-    ) -> Result<Report, StoreError> {
-        if self.level(Level::Topology) {
-            self.interfaces.finish(interfaces, &mut self.report)?;
-        }
-        check_regions(regions, &self.regions, &mut self.report);
-        self.report.volume = self.volumes.of_tets;
-        self.report.volume_within_boundary = self.volumes.within_boundary;
-        if self.options.level >= Level::Geometry {
-            let (found, expected) = (self.report.volume, self.report.volume_within_boundary);
-            let tolerance =
-                VOLUME_TOLERANCE * self.volumes.scale.max(found) + self.volumes.rounding;
-            if (found - expected).abs() > tolerance {
-                let finding = Finding::VolumeDiffers;
-                self.report.find(finding, || {
-                    let what = format!(
-                        "the tetrahedra have volume {found}, their boundary encloses {expected}"
-                    );
-                    Offender::new(finding, None, what)
-                });
-            }
-            if let Some(input) = self.input.take() {
-                input.finish(&mut self.report);
-            }
-            if let Some(wires) = self.wires.take() {
-                wires.finish(&mut self.report);
-            }
-        }
-        self.report.digest = self.digests[0].to_string();
-        self.report.interface_digest = self.digests[1].to_string();
-        Ok(self.report)
     }
 }
 
-/// The chunks hold as many records as the catalog counts.
+/// Checks that the chunks hold as many records as the catalog counts.
 fn counted(part: &Subdomain, what: &str, found: u64, total: u64) -> Result<(), StoreError> {
     if found == total {
         return Ok(());
     }
-    Err(StoreError::Sealed(SealedError::Content {
-        path: part.path().to_owned(),
-        subdomain: part.id().rank(),
-        what: format!("its chunks hold {found} {what}, the catalog counts {total}"),
-    }))
-}
-
-fn mark(used: &mut [u64], vertices: &[u32]) {
-    for &v in vertices {
-        used[v as usize / 64] |= 1 << (v % 64);
-    }
+    let what = format!("its chunks hold {found} {what}, the catalog counts {total}");
+    Err(part.damaged(what).into())
 }

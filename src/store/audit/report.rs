@@ -1,17 +1,20 @@
-//! What a verification found.
+//! The result of a verification: counts, findings and examples.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 
 use serde::Serialize;
 use tetdb_schema::ids::VertexId;
 
 use crate::sealed::Corner;
+use tetdb_base::geom::Point;
 
 /// Offenders kept for each kind of finding; all are counted.
 const OFFENDERS_KEPT: u64 = 10;
 
 /// The levels of checking, each with those before it.
 #[derive(
+    Default,
     Clone,
     Copy,
     Debug,
@@ -27,6 +30,7 @@ const OFFENDERS_KEPT: u64 = 10;
 #[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Every record can be read and counts agree; nodes exist and differ; digests are right.
+    #[default]
     Element,
     /// Every face has two sides, or one and is required.
     Adjacency,
@@ -34,11 +38,11 @@ pub enum Level {
     Topology,
     /// Orientations are exactly positive; facets are the input's triangles, all of them; volumes agree.
     Geometry,
-    /// How many inner faces are locally Delaunay. Informs; decides nothing.
+    /// Share of inner faces that are locally Delaunay; never makes a mesh invalid.
     Delaunay,
 }
 
-/// Kinds of things that make a mesh invalid.
+/// Kinds of faults that make a mesh invalid.
 #[derive(
     Clone,
     Copy,
@@ -96,24 +100,26 @@ pub struct Offender {
     pub finding: Finding,
     /// Rank of the sub-domain where it was found, if there is one.
     pub subdomain: Option<u32>,
-    /// Its tetrahedron, `7:1048211`.
+    /// Id of the tetrahedron, `7:1048211`.
     pub tet: Option<String>,
     /// Ids of the vertices, parallel to `points`.
     pub vertices: Vec<String>,
     /// Positions of the vertices.
     pub points: Vec<[f64; 3]>,
-    /// What was expected and what was found, as a sentence.
+    /// The expected and the found state, as a sentence.
     pub what: String,
 }
 
 /// The result of a verification.
-#[derive(Clone, Debug, PartialEq, Serialize, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
+#[derive(
+    Default, Clone, Debug, PartialEq, Serialize, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize,
+)]
 pub struct Report {
     /// How much was checked.
     pub level: Level,
-    /// Whether nothing was found.
+    /// True if there are no findings.
     pub valid: bool,
-    /// Whether the mesh was compared with its input.
+    /// True if the mesh was compared with its input.
     pub against_input: bool,
     /// Number of sub-domains checked.
     pub subdomains: u64,
@@ -149,13 +155,13 @@ pub struct Report {
     pub volume_within_boundary: f64,
     /// Inner faces that are no facets: tested, and with an empty sphere.
     pub delaunay_tested: u64,
-    /// Those of the tested faces that have an empty sphere.
+    /// Number of tested faces that have an empty sphere.
     pub delaunay_faces: u64,
     /// Digest of the whole mesh.
     pub digest: String,
     /// Digest of the interfaces alone.
     pub interface_digest: String,
-    /// How often each kind was found.
+    /// Number of findings of each kind.
     pub findings: BTreeMap<Finding, u64>,
     /// The first of each kind.
     pub offenders: Vec<Offender>,
@@ -163,36 +169,10 @@ pub struct Report {
 
 impl Report {
     pub(super) fn new(level: Level) -> Self {
-        Self {
-            level,
-            valid: true,
-            against_input: false,
-            subdomains: 0,
-            tets: 0,
-            vertices: 0,
-            facets: 0,
-            interface_faces: 0,
-            inner_faces: 0,
-            boundary_faces: 0,
-            triangles_present: 0,
-            triangles_unfilled: 0,
-            triangles_missing: 0,
-            edges_present: 0,
-            edges_missing: 0,
-            points_present: 0,
-            points_missing: 0,
-            volume: 0.0,
-            volume_within_boundary: 0.0,
-            delaunay_tested: 0,
-            delaunay_faces: 0,
-            digest: String::new(),
-            interface_digest: String::new(),
-            findings: BTreeMap::new(),
-            offenders: Vec::new(),
-        }
+        Self { level, valid: true, ..Self::default() }
     }
 
-    /// Adds what was found of another part of the mesh. What is said of the whole alone, volumes, digests and the input, is left.
+    /// Adds the counts and findings of another part of the mesh; volumes, digests and the input are left to the whole.
     pub(super) fn add(&mut self, part: Self) {
         for (sum, n) in [
             (&mut self.subdomains, part.subdomains),
@@ -232,44 +212,58 @@ impl Report {
         self.findings.get(&finding).copied().unwrap_or(0)
     }
 
-    /// Counts a finding; `describe` is called for the first few of its kind.
-    pub(super) fn find(&mut self, finding: Finding, describe: impl FnOnce() -> Offender) {
+    /// Counts a finding; the first few of its kind are kept, and described by `what` as a sentence.
+    pub(super) fn find(
+        &mut self,
+        finding: Finding,
+        subdomain: impl Into<Option<u32>>,
+        what: impl Display,
+    ) -> KeptOffender<'_> {
         self.valid = false;
         let count = self.findings.entry(finding).or_default();
         *count += 1;
-        if *count <= OFFENDERS_KEPT {
-            self.offenders.push(describe());
+        if *count > OFFENDERS_KEPT {
+            return KeptOffender(None);
         }
-    }
-}
-
-impl Offender {
-    pub(super) fn new(finding: Finding, subdomain: Option<u32>, what: impl Into<String>) -> Self {
-        Self {
+        self.offenders.push(Offender {
             finding,
-            subdomain,
+            subdomain: subdomain.into(),
             tet: None,
             vertices: Vec::new(),
             points: Vec::new(),
-            what: what.into(),
-        }
+            what: what.to_string(),
+        });
+        KeptOffender(self.offenders.last_mut())
+    }
+}
+
+/// An offender being described, unless enough of its kind are kept.
+pub(super) struct KeptOffender<'a>(Option<&'a mut Offender>);
+
+impl KeptOffender<'_> {
+    /// Adds its tetrahedron.
+    pub(super) fn with_tet(self, local: u32) -> Self {
+        let Some(offender) = self.0 else { return self };
+        let subdomain = offender.subdomain.unwrap_or_default();
+        offender.tet = Some(format!("{subdomain}:{local}"));
+        Self(Some(offender))
     }
 
-    pub(super) fn with_tet(mut self, local: u32) -> Self {
-        let subdomain = self.subdomain.unwrap_or_default();
-        self.tet = Some(format!("{subdomain}:{local}"));
-        self
+    /// Adds ids and positions of vertices.
+    pub(super) fn with_corners(self, corners: &[Corner]) -> Self {
+        let Some(offender) = self.0 else { return self };
+        let id = |c: &Corner| match VertexId::from_number(c.id) {
+            Some(id) => id.to_string(),
+            None => format!("{:#x}", c.id),
+        };
+        offender.vertices = corners.iter().map(id).collect();
+        Self(Some(offender)).with_points(corners.iter().map(|c| c.point))
     }
 
-    pub(super) fn with_corners(mut self, corners: &[Corner]) -> Self {
-        self.vertices = corners
-            .iter()
-            .map(|c| match VertexId::from_number(c.id) {
-                Some(id) => id.to_string(),
-                None => format!("{:#x}", c.id),
-            })
-            .collect();
-        self.points = corners.iter().map(|c| c.point.to_array()).collect();
-        self
+    /// Adds positions.
+    pub(super) fn with_points(self, points: impl IntoIterator<Item = Point>) -> Self {
+        let Some(offender) = self.0 else { return self };
+        offender.points = points.into_iter().map(|p| p.to_array()).collect();
+        Self(Some(offender))
     }
 }

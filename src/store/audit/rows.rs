@@ -1,23 +1,24 @@
-//! What summaries and rows of the catalog say, compared with what the records give again.
+//! Summaries and rows of the catalog, compared with values recomputed from the records.
 //!
-//! The writer sums in the order of the records, and so is it done here: numbers must agree bit for bit.
+//! The writer sums in the order of the records, and so does this module: numbers must agree bit for bit.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
+use std::fmt::Display;
 
 use tetdb_schema::catalog::{InterfaceRow, NeighborRow, RegionRow, SubdomainRow, TopologyRow};
 use tetdb_schema::chunk::{TetSummary, VertexSummary};
 use tetdb_schema::digest::Digest;
 use tetdb_schema::record::SealedTet;
 
-use super::{Finding, Offender, Report};
-use crate::sealed::{Corner, RegionTotals, Subdomain, Totals};
+use super::{Finding, Report};
+use crate::sealed::{Corner, RegionTotals, Subdomain, SubdomainTotals};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
 
-/// Of one sub-domain.
+/// Recomputed values of one sub-domain.
 pub(super) struct Rederived {
-    totals: Totals,
+    totals: SubdomainTotals,
     rank: u32,
 }
 
@@ -26,11 +27,11 @@ pub(super) type RegionSums = BTreeMap<u32, RegionTotals>;
 
 impl Rederived {
     pub(super) fn new(rank: u32) -> Self {
-        let totals = Totals::default();
+        let totals = SubdomainTotals::default();
         Self { totals, rank }
     }
 
-    /// The next chunk of tetrahedra, its corners and its summary.
+    /// Adds the next chunk of tetrahedra, its corners and its summary.
     pub(super) fn add(
         &mut self,
         tets: &[SealedTet],
@@ -45,7 +46,7 @@ impl Rederived {
         };
         let (first, rank) = (stored.first, self.rank);
         let Ok(mut found) = self.totals.add(first, tets, rank, corners_of);
-        // Both are known elsewhere: faces are counted when they are paired, bytes when they are read.
+        // Both are checked elsewhere: faces when they are paired, bytes when they are read.
         (found.open_faces, found.bytes) = (stored.open_faces, stored.bytes);
         // Summaries of earlier versions lack it.
         if stored.edge_max == 0.0 {
@@ -53,7 +54,7 @@ impl Rederived {
         }
         if found != *stored {
             let what =
-                format!("the summary of the chunk of tetrahedra {first} and on is another's");
+                format_args!("the summary of the chunk of tetrahedra {first} and on is another's");
             differs(rank, what, report);
         }
     }
@@ -89,7 +90,7 @@ impl Rederived {
                 found.cells = 0;
             }
             if found != stored {
-                let what = format!("the summary of chunk {chunk} of vertices is another's");
+                let what = format_args!("the summary of chunk {chunk} of vertices is another's");
                 differs(rank, what, report);
             }
         }
@@ -103,8 +104,7 @@ impl Rederived {
             ..row.clone()
         };
         if found != *row {
-            let what =
-                "its row gives another quality, volume, box or length of the file".to_owned();
+            let what = "its row gives another quality, volume, box or length of the file";
             differs(rank, what, report);
         }
         for (region, here) in self.totals.regions {
@@ -120,21 +120,19 @@ impl Rederived {
 pub(super) fn check_regions(rows: &[RegionRow], sums: &RegionSums, report: &mut Report) {
     for row in rows {
         let found = sums.get(&row.region).copied().unwrap_or_default();
-        // Of an empty region only its surface is known.
+        // The volume of an empty region is not known.
         if row.tets != found.tets || (row.filled && row.volume != found.volume) {
             let RegionRow { region, tets, .. } = row;
-            let what = format!(
+            let what = format_args!(
                 "region {region} has {} tetrahedra of volume {}, the catalog says {tets} of {}",
                 found.tets, found.volume, row.volume
             );
-            report.find(Finding::CatalogDiffers, || {
-                Offender::new(Finding::CatalogDiffers, None, what)
-            });
+            report.find(Finding::CatalogDiffers, None, what);
         }
     }
 }
 
-/// Compares who neighbors whom with the interfaces, which were compared with their faces; and the list of files with who needs them.
+/// Compares the neighbors with the interfaces, which were compared with their faces, and the list of files with the rows that need them.
 ///
 /// Errors: a damaged catalog.
 pub(super) fn check_catalog(store: &mut Catalog, report: &mut Report) -> Result<(), StoreError> {
@@ -148,12 +146,12 @@ pub(super) fn check_catalog(store: &mut Catalog, report: &mut Report) -> Result<
         let of = expected.remove(&subdomain).unwrap_or_default().into_iter();
         let of = of.map(|(subdomain, faces)| NeighborRow { subdomain, faces });
         if !of.eq(neighbors) {
-            let what = "its row of neighbors is not what its interfaces say".to_owned();
+            let what = "its row of neighbors is not what its interfaces say";
             differs(subdomain, what, report);
         }
     }
     for rank in expected.into_keys() {
-        differs(rank, "it has interfaces and no row of neighbors".to_owned(), report);
+        differs(rank, "it has interfaces and no row of neighbors", report);
     }
     let mut needed: Vec<[u32; 2]> = Vec::new();
     for row in store.subdomains()?.into_iter().chain(store.previous()?) {
@@ -162,12 +160,11 @@ pub(super) fn check_catalog(store: &mut Catalog, report: &mut Report) -> Result<
     let listed: Vec<[u32; 2]> =
         (store.files()?.iter()).map(|file| [file.subdomain, file.generation]).collect();
     for missing in needed.iter().filter(|file| !listed.contains(file)) {
-        differs(missing[0], "its file is not listed".to_owned(), report);
+        differs(missing[0], "its file is not listed", report);
     }
     Ok(())
 }
 
-fn differs(rank: u32, what: String, report: &mut Report) {
-    let finding = Finding::CatalogDiffers;
-    report.find(finding, || Offender::new(finding, Some(rank), what));
+fn differs(rank: u32, what: impl Display, report: &mut Report) {
+    report.find(Finding::CatalogDiffers, rank, what);
 }

@@ -1,7 +1,7 @@
-//! Tetrahedra around a vertex, around an edge, next to one: those that share so many vertices.
+//! Tetrahedra around a vertex or an edge, and neighbors of a tetrahedron: all share some vertices.
 //!
-//! A vertex is at the same place in every sub-domain that has it, and every tetrahedron that has it is in a chunk whose
-//! box holds that place: neither neighbors nor interfaces need be followed.
+//! A vertex has one position in all its sub-domains, and every tetrahedron with the vertex is in a chunk whose
+//! box holds that position: neither neighbors nor interfaces need be followed.
 
 use tetdb_schema::ids::{Owner, TetId, VertexId};
 
@@ -40,7 +40,7 @@ impl QuerySession {
         })
     }
 
-    /// Where a vertex is.
+    /// Position of a vertex.
     fn vertex(&mut self, id: VertexId) -> Result<Point, QueryError> {
         let ranks: Vec<u32> = match id.owner {
             Owner::Subdomain(s) => {
@@ -59,7 +59,7 @@ impl QuerySession {
 
     fn vertex_in(&mut self, rank: u32, id: VertexId) -> Result<Option<Point>, QueryError> {
         let part = &mut self.part(rank)?.subdomain;
-        // Its own vertices have the numbers they were sealed with.
+        // A sub-domain's own vertices have the numbers of their ids.
         if u64::from(id.index) < part.row().vertices {
             let corner = part.corner(id.index)?;
             if corner.id == id.number() {

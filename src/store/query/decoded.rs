@@ -1,7 +1,7 @@
 //! A decoded chunk of tetrahedra with the vertices it needs, free of everything else.
 
 use super::hit::Hit;
-use super::tree::BoxTree;
+use super::tree::OctalBoxTree;
 use crate::sealed::{Chunk, Corner, Subdomain};
 use crate::store::StoreError;
 use tetdb_base::geom::{Aabb, IdMap, Point};
@@ -11,7 +11,7 @@ use tetdb_schema::record::SealedTet;
 /// A tetrahedron of a frame.
 #[derive(Clone, Copy)]
 pub(super) struct FrameTet {
-    /// Its number in the sub-domain.
+    /// Number of the tetrahedron in the sub-domain.
     pub local: u32,
     pub region: u32,
     /// Places of its vertices in the frame.
@@ -29,11 +29,11 @@ pub(super) struct DecodedChunk {
 /// A frame of a whole chunk, and a tree to find points in it.
 pub(super) struct Searched {
     pub frame: DecodedChunk,
-    pub tree: BoxTree,
+    pub tree: OctalBoxTree,
 }
 
 impl DecodedChunk {
-    /// The tetrahedra of a chunk that `keep` wants, with their vertices.
+    /// Decodes the tetrahedra of a chunk that `keep` accepts, with their vertices.
     ///
     /// Errors: damage.
     pub fn new(
@@ -78,13 +78,13 @@ impl DecodedChunk {
         tet.nodes.map(|v| self.ids[v as usize])
     }
 
-    /// Its lasting id.
+    /// Lasting id of a tetrahedron.
     pub fn id(&self, tet: &FrameTet) -> TetId {
         let id = TetId::new(self.part, tet.local);
         id.expect("the reader counted the tetrahedra of the sub-domain")
     }
 
-    /// A tetrahedron with all that is known of it.
+    /// A tetrahedron as an answer.
     pub fn hit(&self, tet: &FrameTet) -> Hit {
         Hit::new(self.id(tet), tet.region, self.ids(tet), self.corners(tet))
     }
@@ -100,7 +100,7 @@ impl DecodedChunk {
 impl Searched {
     pub fn new(frame: DecodedChunk) -> Self {
         let around = |i: usize| Aabb::around(frame.corners(&frame.tets[i]));
-        let tree = BoxTree::new(frame.tets.len(), around);
+        let tree = OctalBoxTree::new(frame.tets.len(), around);
         Self { frame, tree }
     }
 

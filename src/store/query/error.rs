@@ -1,4 +1,4 @@
-//! What can be wrong with a question.
+//! Errors of questions.
 
 use tetdb_schema::ids::{TetId, VertexId};
 
@@ -6,7 +6,7 @@ use crate::sealed::SealedError;
 use crate::store::StoreError;
 use tetdb_base::storage::StorageError;
 
-/// Why there is no answer.
+/// Errors of questions.
 #[derive(Debug, thiserror::Error)]
 pub enum QueryError {
     /// The store could not be read.
@@ -15,19 +15,19 @@ pub enum QueryError {
     /// The store has no such tetrahedron.
     #[error("there is no tetrahedron {id}")]
     NoTet {
-        /// The id asked for.
+        /// The requested id.
         id: TetId,
     },
     /// The store has no such vertex.
     #[error("there is no vertex {id}")]
     NoVertex {
-        /// The id asked for.
+        /// The requested id.
         id: VertexId,
     },
     /// The store has no such label.
     #[error("there is no label {name:?}; there are {}", known.join(", "))]
     NoLabel {
-        /// The label asked for.
+        /// The requested label.
         name: String,
         /// The labels of the store.
         known: Vec<String>,
@@ -35,7 +35,7 @@ pub enum QueryError {
     /// The store has no such region.
     #[error("there is no region {name:?}; there are {}", known.join(", "))]
     NoRegion {
-        /// The region asked for.
+        /// The requested region.
         name: String,
         /// Names of the regions.
         known: Vec<String>,

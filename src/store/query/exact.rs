@@ -6,7 +6,7 @@ use tetdb_base::geom::{Dyadic, Point};
 
 /// A number that can be added and multiplied, and whose sign may be known.
 pub(super) trait Ring: Clone {
-    fn of(x: f64) -> Self;
+    fn from_f64(x: f64) -> Self;
     fn plus(&self, other: &Self) -> Self;
     fn minus(&self, other: &Self) -> Self;
     fn times(&self, other: &Self) -> Self;
@@ -14,7 +14,7 @@ pub(super) trait Ring: Clone {
     fn sign(&self) -> Option<Ordering>;
 }
 
-/// A double and how far it is from the truth at most.
+/// A double and a bound on its error.
 #[derive(Clone, Copy)]
 pub(super) struct Near {
     value: f64,
@@ -33,7 +33,7 @@ impl Near {
 }
 
 impl Ring for Near {
-    fn of(x: f64) -> Self {
+    fn from_f64(x: f64) -> Self {
         Self { value: x, error: 0.0 }
     }
 
@@ -60,7 +60,7 @@ impl Ring for Near {
 }
 
 impl Ring for Dyadic {
-    fn of(x: f64) -> Self {
+    fn from_f64(x: f64) -> Self {
         Self::from(x)
     }
 
@@ -86,13 +86,13 @@ impl Ring for Dyadic {
 pub(super) struct Vector<R>([R; 3]);
 
 impl<R: Ring> Vector<R> {
-    pub fn of(p: Point) -> Self {
-        Self(p.to_array().map(R::of))
+    pub fn from_point(p: Point) -> Self {
+        Self(p.to_array().map(R::from_f64))
     }
 
     /// From `a` to `b`.
     pub fn between(a: Point, b: Point) -> Self {
-        let (a, b) = (Self::of(a), Self::of(b));
+        let (a, b) = (Self::from_point(a), Self::from_point(b));
         Self([0, 1, 2].map(|i| b.0[i].minus(&a.0[i])))
     }
 
@@ -108,7 +108,7 @@ impl<R: Ring> Vector<R> {
     }
 }
 
-/// Whether the number is not below zero.
+/// Returns whether the number is not below zero; `None` if rounding hides its sign.
 pub(super) fn not_negative<R: Ring>(x: &R) -> Option<bool> {
     x.sign().map(|s| s != Ordering::Less)
 }

@@ -1,4 +1,4 @@
-//! The best or the worst tetrahedra, a given number of them, without a look at all.
+//! A given number of the best or the worst tetrahedra, without reading all.
 
 use super::hit::Hit;
 use super::select::hits_in;
@@ -14,7 +14,7 @@ struct Promise {
 }
 
 impl QuerySession {
-    /// Whether [`QuerySession::extreme`] can answer for `selection`: not where each tetrahedron has first to be marked.
+    /// Returns whether [`QuerySession::extreme`] can answer `selection`: no condition needs marks of tetrahedra.
     pub fn has_extremes(&self, selection: &Selection) -> bool {
         selection.labels.is_none() && selection.interface.is_none()
     }
@@ -47,7 +47,7 @@ impl QuerySession {
         Ok(best)
     }
 
-    /// Chunks that may have any, the most promising first.
+    /// Chunks that may have hits, the most promising first.
     fn promises(&mut self, selection: &Selection, sign: f64) -> Result<Vec<Promise>, QueryError> {
         let rows = self.rows.iter();
         let ranks: Vec<u32> = rows

@@ -1,4 +1,4 @@
-//! A tetrahedron as an answer, and what can be asked of it by name.
+//! A tetrahedron as an answer, and its named values.
 
 use tetdb_schema::ids::TetId;
 
@@ -7,7 +7,7 @@ use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::shape::excess;
 use tetdb_schema::chunk::TetSummary;
 
-/// What an expression may name, and what answers may be ordered by. Lengths and volumes in the units of the input, `x y z` are those
+/// Names in expressions, and values by which answers may be ordered. Lengths and volumes are in the units of the input, `x y z` are those
 /// of the centroid, angles are dihedral ones in degrees; `excess` is the
 /// quality over the least that the tetrahedron's faces on the surface allow.
 pub const VARIABLES: [&str; 12] = [
@@ -28,10 +28,10 @@ pub const VARIABLES: [&str; 12] = [
 /// The place of `excess` among the [`VARIABLES`]: the one that needs the surface.
 pub(super) const EXCESS: usize = VARIABLES.len() - 1;
 
-/// A tetrahedron that was asked for.
+/// A tetrahedron in an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Its id.
+    /// Id of the tetrahedron.
     pub id: TetId,
     /// Number of its region.
     pub region: u32,
@@ -39,16 +39,16 @@ pub struct Hit {
     pub vertices: [u64; 4],
     /// Positions of its vertices, parallel to `vertices`.
     pub corners: [Point; 4],
-    /// Its quality, volume, edges and angles.
+    /// Quality, volume, edges and angles.
     pub shape: Shape,
-    /// Which faces, each opposite the vertex of its place, are input triangles; known where the question is about excess.
+    /// True for the faces that are input triangles, each opposite the vertex of its place; known for questions about excess.
     pub on_surface: Option<[bool; 4]>,
 }
 
 impl Hit {
-    /// With its shape measured.
+    /// A hit with its shape measured.
     pub fn new(id: TetId, region: u32, vertices: [u64; 4], corners: [Point; 4]) -> Self {
-        Self { id, region, vertices, corners, shape: Shape::of(corners), on_surface: None }
+        Self { id, region, vertices, corners, shape: Shape::new(corners), on_surface: None }
     }
 
     /// The mean of its corners.
@@ -73,7 +73,7 @@ impl Hit {
         [degrees(greatest), degrees(least)]
     }
 
-    /// Its quality over the least that its faces on the surface allow any tetrahedron; NaN where these are not known.
+    /// Quality over the least that the faces on the surface allow any tetrahedron; NaN where these are not known.
     pub fn excess(&self) -> f64 {
         (self.on_surface).map_or(f64::NAN, |faces| excess(self.corners, faces))
     }
@@ -99,7 +99,7 @@ impl Hit {
     }
 }
 
-/// Where the values of [`VARIABLES`] of a chunk's tetrahedra lie.
+/// Ranges of the values of [`VARIABLES`] in a chunk's tetrahedra.
 pub(super) fn ranges(summary: &TetSummary, rank: u32) -> [[f64; 2]; VARIABLES.len()] {
     let [low, high] = summary.bounds.map(Point::from_array);
     // Rounding may carry a mean of four out of their box.

@@ -1,10 +1,9 @@
-//! A single point, with as few chunks as can be.
+//! Location of a single point with as few chunks as possible.
 //!
-//! No vertex of a tetrahedron that holds the point is farther from it than the longest edge of its chunk, and the tetrahedron lies in
-//! the box around its vertices. Of a vertex that has not been read the box of its chunk is known. So a chunk of
-//! tetrahedra is read only when one of the vertices that lead them is near enough, most of it is ruled out at once, and each
-//! chunk of vertices that is read rules out more. What is left decides what is read next: the chunk that completes most,
-//! where the point is central in it.
+//! A tetrahedron that holds the point lies in the box around its vertices. Each of these is at most as far from the point as the longest edge of
+//! the chunk is long. The box of a vertex that is not read yet is that of its chunk. A chunk of tetrahedra is read only when one of its leading
+//! vertices is near enough, and these bounds rule out most of it. Each chunk of vertices that is read rules out more. The next chunk to read is
+//! the one that completes the most tetrahedra, and among equals the one where the point is most central.
 
 use std::collections::BTreeMap;
 
@@ -12,8 +11,8 @@ use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedTet;
 
 use super::hit::Hit;
-use super::locate::{Candidate, Search, holds, leaders};
-use super::near::{Near, nearness};
+use super::locate::{ChunkCandidate, Search, holds, leaders};
+use super::near::{NearVertices, nearness};
 use super::session::{checked_chunk, vertex_chunk};
 use super::{QueryError, QuerySession};
 use crate::sealed::Subdomain;
@@ -28,26 +27,26 @@ struct Waiting {
     chunks: [u32; 4],
 }
 
-/// What is wanted, and what has been read.
-struct Lazy {
+/// A search for one point, with the chunks read so far.
+struct LazySearch {
     point: Point,
     /// No vertex of a tetrahedron that holds the point is farther away.
     reach: f64,
     waiting: Vec<Waiting>,
-    /// Chunks of vertices looked at, by sub-domain and number: what they have near, and whether they are read.
-    chunks: IdMap<(u32, u32), (Near, bool)>,
+    /// Chunks of vertices by sub-domain and number: their vertices near the point, and whether they are read.
+    chunks: IdMap<(u32, u32), (NearVertices, bool)>,
 }
 
-impl Lazy {
-    /// What a chunk of vertices has near the point, and whether it is read.
-    fn near(&mut self, part: &Subdomain, chunk: u32) -> (Near, bool) {
+impl LazySearch {
+    /// Vertices of a chunk near the point, and whether the chunk is read.
+    fn near(&mut self, part: &Subdomain, chunk: u32) -> (NearVertices, bool) {
         let (p, reach) = (self.point, self.reach);
-        let new = || (Near::of(part, chunk as usize, p, reach), false);
+        let new = || (NearVertices::new(part, chunk as usize, p, reach), false);
         let key = (part.id().rank(), chunk);
         *self.chunks.entry(key).or_insert_with(new)
     }
 
-    /// From now on the chunk is read.
+    /// Marks a chunk as read.
     fn note(&mut self, rank: u32, chunk: u32) {
         if let Some((_, is_read)) = self.chunks.get_mut(&(rank, chunk)) {
             *is_read = true;
@@ -92,11 +91,11 @@ impl QuerySession {
     /// Looks for the point in these chunks. Errors: damage.
     pub(super) fn search_lazily(
         &mut self,
-        candidates: &[Candidate],
+        candidates: &[ChunkCandidate],
         search: &mut Search,
     ) -> Result<(), QueryError> {
         let reaches = candidates.iter().map(|c| c.reach);
-        let mut lazy = Lazy {
+        let mut lazy = LazySearch {
             point: search.point,
             reach: reaches.fold(0.0, f64::max),
             waiting: Vec::new(),
@@ -113,7 +112,11 @@ impl QuerySession {
     }
 
     /// Adds the tetrahedra of a chunk that may hold the point.
-    fn gather(&mut self, candidate: &Candidate, lazy: &mut Lazy) -> Result<(), QueryError> {
+    fn gather(
+        &mut self,
+        candidate: &ChunkCandidate,
+        lazy: &mut LazySearch,
+    ) -> Result<(), QueryError> {
         check_cancelled();
         let part = &mut self.part(candidate.rank)?.subdomain;
         if !is_led_near(part, candidate, lazy)? {
@@ -126,10 +129,10 @@ impl QuerySession {
         let mut place = 0;
         for (local, tet) in (records.first..).zip(records.records) {
             if let Some(&v) = tet.nodes.iter().find(|&&v| u64::from(v) >= n_vertices) {
-                // Says what is wrong.
+                // Returns the error.
                 part.corner(v)?;
             }
-            // Nearly all are ruled out by the vertex that leads them: where the others are is not asked.
+            // The leading vertex rules out nearly all tetrahedra, before the others are looked up.
             let (mut chunks, mut around) = ([0; 4], Some(Aabb::EMPTY));
             for (v, chunk) in tet.nodes.into_iter().zip(&mut chunks) {
                 *chunk = vertex_chunk(part, v, &mut place) as u32;
@@ -147,11 +150,11 @@ impl QuerySession {
         Ok(())
     }
 
-    /// Reads chunks of vertices that are not farther than `most` until the point is settled; looks at what has all its vertices.
+    /// Reads chunks of vertices that are not farther than `most` until the point is settled; tests tetrahedra whose vertices are all read.
     fn read_up_to(
         &mut self,
         most: f64,
-        lazy: &mut Lazy,
+        lazy: &mut LazySearch,
         search: &mut Search,
     ) -> Result<(), QueryError> {
         loop {
@@ -186,11 +189,11 @@ impl QuerySession {
     }
 }
 
-/// Whether a vertex that leads tetrahedra of the chunk may be near enough; reads what chunks of vertices that takes, the nearest first.
+/// Returns whether a vertex that leads tetrahedra of the chunk may be near enough; reads the chunks of vertices this takes, the nearest first.
 fn is_led_near(
     part: &mut Subdomain,
-    candidate: &Candidate,
-    lazy: &mut Lazy,
+    candidate: &ChunkCandidate,
+    lazy: &mut LazySearch,
 ) -> Result<bool, StoreError> {
     if lazy.reach == f64::INFINITY {
         return Ok(true);
@@ -217,8 +220,8 @@ fn is_led_near(
     Ok(false)
 }
 
-/// Whether what is known of its vertices lets the tetrahedron hold the point.
-fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut Lazy) -> Result<bool, StoreError> {
+/// Returns whether the known bounds of its vertices let the tetrahedron hold the point.
+fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut LazySearch) -> Result<bool, StoreError> {
     let mut around = Aabb::EMPTY;
     for (v, chunk) in w.tet.nodes.into_iter().zip(w.chunks) {
         match bounds_near(part, v, chunk, lazy)? {
@@ -229,13 +232,13 @@ fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut Lazy) -> Result<bool, 
     Ok(holds(&around, lazy.point))
 }
 
-/// Where a vertex of a chunk lies, as far as that is known; `None`: too far away.
+/// Known bounds of a vertex of a chunk; `None` if the vertex is too far away.
 #[inline]
 fn bounds_near(
     part: &mut Subdomain,
     v: u32,
     chunk: u32,
-    lazy: &mut Lazy,
+    lazy: &mut LazySearch,
 ) -> Result<Option<Aabb>, StoreError> {
     let (near, is_read) = lazy.near(part, chunk);
     let bounds = match is_read {

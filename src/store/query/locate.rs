@@ -1,4 +1,4 @@
-//! Which tetrahedron holds a point.
+//! Location of points: the tetrahedra that hold them.
 
 use std::ops::Range;
 
@@ -6,19 +6,19 @@ use tetdb_schema::ids::TetId;
 
 use super::decoded::Searched;
 use super::hit::Hit;
-use super::near::Near;
+use super::near::NearVertices;
 use super::session::{bounds_of, chunk_bounds, reach};
 use super::{QueryError, QuerySession};
 use crate::sealed::Subdomain;
 use tetdb_base::geom::{Aabb, HilbertFrame, Point, orient};
 
-/// Up to so many points are looked for one by one, each in as few chunks as can be; more make it worth to decode chunks whole.
+/// Greatest number of points that are located one by one, each in as few chunks as possible; for more it pays to decode whole chunks.
 const FEW: usize = 16;
 
-/// A point and the tetrahedron that holds it; of several, which then have it on a face, the one with the least id.
+/// A point and the tetrahedron that holds it; of several tetrahedra with the point on a face, the one with the least id.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Located {
-    /// The point asked for.
+pub struct LocatedPoint {
+    /// The point.
     pub point: Point,
     /// `None` outside the mesh.
     pub found: Option<Hit>,
@@ -28,26 +28,26 @@ pub struct Located {
 
 /// A chunk whose box holds the point.
 #[derive(Clone, Copy)]
-pub(super) struct Candidate {
+pub(super) struct ChunkCandidate {
     pub rank: u32,
     pub chunk: u32,
     resident: bool,
-    /// Negative where the point is within the box of vertices that lead its tetrahedra.
+    /// Least distance of a leading vertex; negative where the point is within the box of such vertices.
     nearness: f64,
-    /// How far vertices of a tetrahedron that holds the point can be.
+    /// Greatest distance of a vertex of a tetrahedron that holds the point.
     pub reach: f64,
 }
 
-/// What is known of a point so far.
+/// State of the search for a point.
 pub(super) struct Search {
     pub point: Point,
     pub best: Option<(Hit, [f64; 4])>,
-    /// Whether the point is strictly inside `best`: no other tetrahedron holds it.
+    /// True if the point is strictly inside `best`, so that no other tetrahedron holds it.
     pub settled: bool,
 }
 
 impl Search {
-    /// Looks at a tetrahedron.
+    /// Tests a tetrahedron.
     pub fn look(&mut self, id: TetId, corners: &[Point; 4], found: impl FnOnce() -> Hit) {
         let Some(shares) = shares(corners, self.point) else {
             return;
@@ -74,7 +74,7 @@ fn shares(corners: &[Point; 4], p: Point) -> Option<[f64; 4]> {
     Some(shares)
 }
 
-/// Whether a box holds a point.
+/// Returns whether a box holds a point.
 pub(super) fn holds(bounds: &Aabb, p: Point) -> bool {
     bounds.low.cmple(p).all() && p.cmple(bounds.high).all()
 }
@@ -82,16 +82,16 @@ pub(super) fn holds(bounds: &Aabb, p: Point) -> bool {
 impl QuerySession {
     /// Finds the tetrahedra of `points`; the answers are in their order.
     ///
-    /// Many points share the chunks they need: they are looked for in the order of the Hilbert curve.
+    /// Points are located in the order of the Hilbert curve, so that they share chunks.
     /// Memory: some 300 bytes a point. Errors: damage.
-    pub fn locate(&mut self, points: &[Point]) -> Result<Vec<Located>, QueryError> {
+    pub fn locate(&mut self, points: &[Point]) -> Result<Vec<LocatedPoint>, QueryError> {
         let curve = HilbertFrame::new(&self.bounds());
         let mut order: Vec<(u64, usize)> =
             points.iter().enumerate().map(|(i, &p)| (curve.index(p), i)).collect();
         order.sort_unstable();
-        let mut answers: Vec<Located> = points
+        let mut answers: Vec<LocatedPoint> = points
             .iter()
-            .map(|&point| Located { point, found: None, barycentric: [0.0; 4] })
+            .map(|&point| LocatedPoint { point, found: None, barycentric: [0.0; 4] })
             .collect();
         let mut candidates = Vec::new();
         for (_, i) in order {
@@ -109,7 +109,7 @@ impl QuerySession {
         &mut self,
         point: Point,
         lazily: bool,
-        candidates: &mut Vec<Candidate>,
+        candidates: &mut Vec<ChunkCandidate>,
     ) -> Result<Search, QueryError> {
         let mut search = Search { point, best: None, settled: false };
         self.candidates(point, candidates)?;
@@ -127,7 +127,11 @@ impl QuerySession {
     }
 
     /// The chunks whose boxes hold a point, resident ones first, then the most promising.
-    fn candidates(&mut self, p: Point, candidates: &mut Vec<Candidate>) -> Result<(), QueryError> {
+    fn candidates(
+        &mut self,
+        p: Point,
+        candidates: &mut Vec<ChunkCandidate>,
+    ) -> Result<(), QueryError> {
         candidates.clear();
         let mut ranks = Vec::new();
         self.tree.visit(&|b| holds(b, p), &mut |i| {
@@ -144,7 +148,7 @@ impl QuerySession {
                 let reach = reach(&part.subdomain, chunk);
                 let nearness = leaders_nearness(&part.subdomain, chunk, p);
                 if nearness <= reach {
-                    candidates.push(Candidate {
+                    candidates.push(ChunkCandidate {
                         rank,
                         chunk: chunk as u32,
                         resident: false,
@@ -167,8 +171,8 @@ impl QuerySession {
 
 /// The vertices that lead the tetrahedra of a chunk: the first, and one after the last.
 ///
-/// Tetrahedra are sorted by their least vertex, and vertices along a curve: those of a chunk are led by the vertices from its least
-/// one to the least of the next chunk, which are in chunks of vertices with small boxes.
+/// Tetrahedra are sorted by their least vertex, and vertices along a curve. So the least vertices of a chunk's tetrahedra run from that of its
+/// first one to that of the next chunk, and lie in chunks of vertices with small boxes.
 pub(super) fn leaders(part: &Subdomain, chunk: usize) -> Range<u32> {
     let least = |chunk: usize| part.tet_summaries().get(chunk).map(|s| s.vertices[0]);
     let n_vertices = part.row().vertices as u32;
@@ -177,13 +181,13 @@ pub(super) fn leaders(part: &Subdomain, chunk: usize) -> Range<u32> {
     first..last.min(n_vertices)
 }
 
-/// How near they are, as far as the boxes of their chunks tell.
+/// Least distance of the leading vertices of a chunk, bounded by the boxes of their chunks.
 fn leaders_nearness(part: &Subdomain, chunk: usize, p: Point) -> f64 {
     let leaders = leaders(part, chunk);
     let first = part.vertex_chunk_of(leaders.start);
     let last = part.vertex_chunk_of(leaders.end.saturating_sub(1));
     (first..=last.max(first))
-        .map(|c| Near::of(part, c, p, f64::INFINITY).nearness)
+        .map(|c| NearVertices::new(part, c, p, f64::INFINITY).nearness)
         .fold(f64::INFINITY, f64::min)
 }
 

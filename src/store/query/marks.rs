@@ -1,34 +1,33 @@
-//! Which tetrahedra of a sub-domain have a face on input triangles or on an interface: a bit for each.
+//! Tetrahedra of a sub-domain with a face on input triangles or on an interface: a bit for each.
 
 use super::selection::Selection;
 use super::{QueryError, QuerySession};
-use crate::sealed::SealedError;
+use crate::sealed::{BitSet, Subdomain, input_index};
 use crate::store::StoreError;
 use std::collections::{HashMap, HashSet};
 use tetdb_base::storage::{Lease, check_cancelled};
-use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::{NO_TET, SealedFacet};
 
-/// Bytes in tables for an embedded edge that is asked for: itself, its ends and their numbers in a sub-domain.
+/// Bytes of tables for an embedded edge: itself, its ends and their numbers in a sub-domain.
 const WIRE_BYTES: u64 = 128;
 
 /// A bit for each tetrahedron of a sub-domain.
 pub struct Marks {
-    bits: Vec<u64>,
+    bits: BitSet,
     _lease: Lease,
 }
 
 impl Marks {
     pub fn has(&self, local: u32) -> bool {
-        self.bits[local as usize / 64] >> (local % 64) & 1 != 0
+        self.bits.contains(local.into())
     }
 
-    /// Whether any of `count` tetrahedra from `first` on is marked.
+    /// Returns whether any of `count` tetrahedra from `first` on is marked.
     pub fn any(&self, first: u32, count: u32) -> bool {
         let (mut at, end) = (first, first + count);
         while at < end {
             if at % 64 == 0 && end - at >= 64 {
-                if self.bits[at as usize / 64] != 0 {
+                if self.bits.words()[at as usize / 64] != 0 {
                     return true;
                 }
                 at += 64;
@@ -41,16 +40,15 @@ impl Marks {
         false
     }
 
-    /// Only what the other has too.
+    /// Keeps the tetrahedra that are also in the other set.
     fn and(&mut self, other: &Self) {
-        for (own, other) in self.bits.iter_mut().zip(&other.bits) {
-            *own &= other;
-        }
+        let words = self.bits.words_mut().iter_mut().zip(other.bits.words());
+        words.for_each(|(own, other)| *own &= other);
     }
 }
 
 impl QuerySession {
-    /// The tetrahedra of a sub-domain that suit labels and interface, or `None` where neither is asked for.
+    /// The tetrahedra of a sub-domain that satisfy the conditions on labels, sheets and interface; `None` without such conditions.
     ///
     /// Errors: damage; a budget that has not a bit for each.
     pub fn marks(&mut self, rank: u32, selection: &Selection) -> Result<Option<Marks>, QueryError> {
@@ -85,9 +83,9 @@ impl QuerySession {
     }
 
     fn blank(&mut self, rank: u32) -> Result<Marks, QueryError> {
-        let words = self.part(rank)?.subdomain.row().tets.div_ceil(64);
-        let lease = self.budget.lease(words * 8, "a bit for each tetrahedron")?;
-        Ok(Marks { bits: vec![0; words as usize], _lease: lease })
+        let n_tets = self.part(rank)?.subdomain.row().tets;
+        let lease = self.budget.lease(n_tets.div_ceil(64) * 8, "a bit for each tetrahedron")?;
+        Ok(Marks { bits: BitSet::new(n_tets), _lease: lease })
     }
 
     fn on_facets(
@@ -133,10 +131,7 @@ impl QuerySession {
         let part = &mut self.part(rank)?.subdomain;
         let mut inputs = HashMap::new();
         for (local, vertex) in (0u32..).zip(part.vertices()) {
-            let id = VertexId::from_number(vertex?.id);
-            if let Some(VertexId { owner: Owner::Surface, index }) = id
-                && on_wires.contains(&index)
-            {
+            if let Some(index) = input_index(vertex?.id).filter(|v| on_wires.contains(v)) {
                 inputs.insert(local, index);
             }
         }
@@ -174,14 +169,11 @@ impl QuerySession {
     }
 }
 
-fn set(marks: &mut Marks, tet: u32, part: &crate::sealed::Subdomain) -> Result<(), StoreError> {
+fn set(marks: &mut Marks, tet: u32, part: &Subdomain) -> Result<(), StoreError> {
     if u64::from(tet) >= part.row().tets {
-        return Err(StoreError::Sealed(SealedError::Content {
-            path: part.path().to_owned(),
-            subdomain: part.id().rank(),
-            what: format!("a face names tetrahedron {tet}, there are {}", part.row().tets),
-        }));
+        let what = format!("a face names tetrahedron {tet}, there are {}", part.row().tets);
+        return Err(part.damaged(what).into());
     }
-    marks.bits[tet as usize / 64] |= 1 << (tet % 64);
+    marks.bits.insert(tet.into());
     Ok(())
 }

@@ -1,13 +1,13 @@
 //! Questions to a finished store, answered from the chunks that matter.
 //!
-//! A [`QuerySession`] holds a store open within a budget: some sub-domains' summaries, and the chunks decoded last. A
-//! question rules out sub-domains by their boxes, then chunks by their summaries (box, qualities, regions, vertices), and
-//! decides with exact signs inside the chunks that are left. Answers come as iterators; nothing here knows formats.
+//! A [`QuerySession`] holds a store open within a budget: some sub-domains' summaries, and the chunks decoded last. A question rules out
+//! sub-domains by their boxes, then chunks by their summaries (box, qualities, regions, vertices). Inside the remaining chunks it decides with
+//! exact signs. Answers are iterators; this module has no file formats.
 //!
-//! Reading order: `solid` (boxes, balls, planes and what meets them) on `exact`; `decoded` (a decoded chunk) and `tree`;
-//! `session` (what is held open); `locate` (points), `lazy` (a single point); `hit` (a tetrahedron with its columns);
-//! `selection` (what is asked for), `marks` (tetrahedra on the surface and on interfaces), `surface_faces` (their faces on the surface), `select` (the answers one after the other),
-//! `order` (sorted), `extreme` (the worst few), `around` (tetrahedra around vertices, edges, neighbors).
+//! Reading order: `solid` (boxes, balls, planes) on `exact`; `decoded` (a decoded chunk) and `tree`; `session` (open files and caches); `locate`
+//! (points), `lazy` (a single point); `hit` (a tetrahedron with its values); `selection` (conditions), `marks` (tetrahedra on the surface and on
+//! interfaces), `surface_faces` (required faces), `select` (the hits in order of id), `order` (sorted), `extreme` (the worst few), `around`
+//! (tetrahedra around vertices and edges, neighbors).
 
 mod around;
 mod decoded;
@@ -29,7 +29,7 @@ mod tree;
 
 pub use error::QueryError;
 pub use hit::{Hit, VARIABLES};
-pub use locate::Located;
+pub use locate::LocatedPoint;
 pub use order::Ordered;
 pub use select::Selected;
 pub use selection::{Selection, Sharing};

@@ -1,19 +1,19 @@
-//! How near a chunk of vertices comes to a point, as far as its summary tells.
+//! Bounds of the distance between a point and the vertices of a chunk, from the summary of the chunk.
 
 use crate::sealed::Subdomain;
 use tetdb_base::geom::{Aabb, Point};
 
-/// What a chunk of vertices has near a point, as far as its summary tells.
+/// Vertices of a chunk near a point, as bounded by the summary of the chunk.
 #[derive(Clone, Copy)]
-pub(super) struct Near {
-    /// The distance of the nearest cell that has vertices; where the point is in one, a negative number, the less the more central.
+pub(super) struct NearVertices {
+    /// Distance of the nearest cell that has vertices; negative for a point in a cell, lower for a more central one.
     pub nearness: f64,
-    /// Around all places within reach where there may be vertices; empty where there are none.
+    /// Box around all places within reach that may have vertices; empty where there are none.
     pub bounds: Aabb,
 }
 
-impl Near {
-    pub(super) fn of(part: &Subdomain, chunk: usize, p: Point, reach: f64) -> Self {
+impl NearVertices {
+    pub(super) fn new(part: &Subdomain, chunk: usize, p: Point, reach: f64) -> Self {
         let mut near = Self { nearness: f64::INFINITY, bounds: Aabb::EMPTY };
         for cell in part.vertex_summaries()[chunk].cells() {
             let [low, high] = cell.map(Point::from_array);
@@ -28,7 +28,7 @@ impl Near {
     }
 }
 
-/// The distance of a point from a box; within it, a negative number, the less the more central it is.
+/// Distance of a point from a box; negative for a point in the box, lower for a more central one.
 pub(super) fn nearness(bounds: &Aabb, p: Point) -> f64 {
     let outside = (p - p.clamp(bounds.low, bounds.high)).length();
     if outside > 0.0 {

@@ -22,7 +22,7 @@ sort_record! {
     }
 }
 
-/// Where faces on the surface are not known.
+/// Value for a hit whose faces on the surface are not known.
 const UNKNOWN: u32 = 16;
 
 /// Tetrahedra ascending by one of the [`VARIABLES`](super::VARIABLES), or descending; equal ones by id.

@@ -15,7 +15,7 @@ use tetdb_base::geom::{Aabb, IdMap, Point};
 
 /// The answers to [`QuerySession::select`]; holds one chunk's at a time. Ends after the first error.
 pub struct Selected<'a> {
-    inquiry: &'a mut QuerySession,
+    session: &'a mut QuerySession,
     selection: Selection,
     ranks: IntoIter<u32>,
     rank: u32,
@@ -26,7 +26,7 @@ pub struct Selected<'a> {
 }
 
 impl QuerySession {
-    /// Tetrahedra of which all of `selection` holds, in the order of their ids.
+    /// Tetrahedra that satisfy all of `selection`, in the order of their ids.
     ///
     /// Errors: sub-domains the store does not have; an interface that is not there.
     pub fn select(&mut self, selection: Selection) -> Result<Selected<'_>, QueryError> {
@@ -38,7 +38,7 @@ impl QuerySession {
             .map(|row| row.rank)
             .collect();
         Ok(Selected {
-            inquiry: self,
+            session: self,
             selection,
             ranks: ranks.into_iter(),
             rank: 0,
@@ -71,9 +71,9 @@ impl QuerySession {
 }
 
 impl Selected<'_> {
-    /// What it has cost so far.
+    /// Cost of the session so far.
     pub fn measures(&self) -> crate::query::Measures {
-        self.inquiry.measures()
+        self.session.measures()
     }
 
     /// Opens the next sub-domain, or returns `false` after the last.
@@ -83,8 +83,8 @@ impl Selected<'_> {
         };
         self.rank = rank;
         self.marks = None;
-        let marks = self.inquiry.marks(rank, &self.selection)?;
-        let part = self.inquiry.part(rank)?;
+        let marks = self.session.marks(rank, &self.selection)?;
+        let part = self.session.part(rank)?;
         let mut chunks = Vec::new();
         for (chunk, summary) in (0u32..).zip(part.subdomain.tet_summaries()) {
             let marked = marks.as_ref().is_none_or(|m| m.any(summary.first, summary.count));
@@ -102,7 +102,7 @@ impl Selected<'_> {
     }
 
     fn read(&mut self, chunk: u32) -> Result<(), QueryError> {
-        let found = hits_in(self.inquiry, &self.selection, &self.marks, self.rank, chunk)?;
+        let found = hits_in(self.session, &self.selection, &self.marks, self.rank, chunk)?;
         self.ready = found.into_iter();
         Ok(())
     }
@@ -134,9 +134,9 @@ impl Iterator for Selected<'_> {
     }
 }
 
-/// What suits in one chunk, ascending by id.
+/// Hits in one chunk, ascending by id.
 pub(super) fn hits_in(
-    inquiry: &mut QuerySession,
+    session: &mut QuerySession,
     selection: &Selection,
     marks: &Option<Marks>,
     rank: u32,
@@ -144,11 +144,11 @@ pub(super) fn hits_in(
 ) -> Result<Vec<Hit>, QueryError> {
     let mut nearby = Nearby::default();
     let surface = match selection.needs_surface() {
-        true => Some(inquiry.surface_of(rank)?),
+        true => Some(session.surface_of(rank)?),
         false => None,
     };
     let mut on_surface = Vec::new();
-    let frame = inquiry.frame(rank, chunk, |part, local, tet| {
+    let frame = session.frame(rank, chunk, |part, local, tet| {
         let keep = marks.as_ref().is_none_or(|m| m.has(local))
             && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
             && (!selection.is_local() || nearby.may_meet(part, selection, chunk, tet.nodes));
@@ -162,7 +162,7 @@ pub(super) fn hits_in(
     Ok(found.filter(|found| selection.holds(found)).collect())
 }
 
-/// Which places of a chunk of tetrahedra matter to a selection: a tetrahedron that meets it has all its vertices as near as its longest edge is long.
+/// Places of a chunk that matter to a selection: all vertices of a tetrahedron that meets it are within the length of its longest edge.
 #[derive(Default)]
 struct Nearby {
     /// For a chunk of vertices a box around those of its cells that are near enough; empty where none are.
@@ -171,8 +171,8 @@ struct Nearby {
 }
 
 impl Nearby {
-    /// What chunk `c` of vertices has for tetrahedra with edges not longer than `reach`.
-    fn of(&mut self, part: &Subdomain, selection: &Selection, reach: f64, c: usize) -> Aabb {
+    /// Box around the cells of chunk `c` of vertices that matter to tetrahedra with edges not longer than `reach`.
+    fn cells(&mut self, part: &Subdomain, selection: &Selection, reach: f64, c: usize) -> Aabb {
         *self.boxes.entry(c).or_insert_with(|| {
             let mut near = Aabb::EMPTY;
             for cell in part.vertex_summaries()[c].cells() {
@@ -186,7 +186,7 @@ impl Nearby {
         })
     }
 
-    /// Whether a tetrahedron of the chunk with these vertices may meet the selection.
+    /// Returns whether a tetrahedron of the chunk with these vertices may meet the selection.
     fn may_meet(
         &mut self,
         part: &Subdomain,
@@ -198,7 +198,7 @@ impl Nearby {
         let mut around = Aabb::EMPTY;
         for v in nodes {
             let c = vertex_chunk(part, v, &mut self.place);
-            let near = self.of(part, selection, reach, c);
+            let near = self.cells(part, selection, reach, c);
             if near.low.x > near.high.x {
                 return false;
             }
@@ -208,14 +208,14 @@ impl Nearby {
     }
 }
 
-/// Whether a vertex that leads tetrahedra of the chunk may be near enough to the selection.
+/// Returns whether a vertex that leads tetrahedra of the chunk may be near enough to the selection.
 fn is_led_near(part: &Subdomain, selection: &Selection, chunk: usize) -> bool {
     let leaders = leaders(part, chunk);
     let first = part.vertex_chunk_of(leaders.start);
     let last = part.vertex_chunk_of(leaders.end.saturating_sub(1)).max(first);
     let (mut nearby, reach) = (Nearby::default(), reach(part, chunk));
     (first..=last).any(|c| {
-        let near = nearby.of(part, selection, reach, c);
+        let near = nearby.cells(part, selection, reach, c);
         near.low.x <= near.high.x
     })
 }

@@ -1,54 +1,55 @@
-//! What is asked for, and what of it follows from summaries.
+//! Conditions on tetrahedra, and their consequences for summaries.
 
 use tetdb_schema::chunk::TetSummary;
-use tetdb_schema::ids::{Owner, TetId};
+use tetdb_schema::ids::TetId;
 
 use super::hit::{EXCESS, Hit, ranges};
 use super::solid::Solid;
+use crate::sealed::input_index;
 use tetdb_base::expr::Expression;
 use tetdb_base::geom::{Aabb, Point};
 
-/// Tetrahedra that all of this holds of; by default, all.
+/// Conditions that a tetrahedron must satisfy together; by default none.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
-    /// They meet each of these.
+    /// The tetrahedron meets each of these solids.
     pub solids: Vec<Solid>,
-    /// They even lie wholly in each of them.
+    /// The tetrahedron is wholly in each of the solids.
     pub inside: bool,
-    /// Their sub-domain is one of these ranks.
+    /// The rank of its sub-domain is one of these.
     pub subdomains: Option<Vec<u32>>,
-    /// Their region is one of these.
+    /// The number of its region is one of these.
     pub regions: Option<Vec<u32>>,
-    /// They are among these.
+    /// The tetrahedron is one of these.
     pub tets: Option<Vec<TetId>>,
-    /// They have a face on an input triangle with one of these labels.
+    /// It has a face on an input triangle with one of these labels.
     pub labels: Option<Vec<u32>>,
-    /// They have a vertex of the input.
+    /// It has a vertex of the input.
     pub touching_surface: bool,
-    /// They have a face on a sheet.
+    /// It has a face on a sheet.
     pub touching_sheet: bool,
-    /// They have a face on the interface of these two sub-domains.
+    /// It has a face on the interface of these two sub-domains.
     pub interface: Option<[u32; 2]>,
-    /// They share a vertex, an edge or a face with these.
+    /// It shares vertices with these.
     pub sharing: Option<Sharing>,
-    /// A truth about the [`VARIABLES`](super::VARIABLES).
+    /// A condition on the [`VARIABLES`](super::VARIABLES).
     pub condition: Option<Expression>,
-    /// Whether the excess of what is found is asked for, be it in no condition.
+    /// True if the excess of the hits is needed, also without a condition on it.
     pub excess: bool,
 }
 
-/// Vertices, of which a tetrahedron has some.
+/// Vertices, some of which a tetrahedron must have.
 #[derive(Clone, Debug)]
 pub struct Sharing {
     pub(super) vertices: Vec<(u64, Point)>,
-    /// So many of them at least.
+    /// Least number of shared vertices.
     pub(super) at_least: usize,
-    /// Not this one.
+    /// A tetrahedron to leave out.
     pub(super) except: Option<TetId>,
 }
 
 impl Sharing {
-    /// Whether tetrahedra within `bounds` may have that many.
+    /// Returns whether tetrahedra within `bounds` may have as many of the vertices.
     fn may_meet(&self, bounds: &Aabb) -> bool {
         let inside = |p: &Point| bounds.low.cmple(*p).all() && p.cmple(bounds.high).all();
         self.vertices.iter().filter(|(_, p)| inside(p)).count() >= self.at_least
@@ -61,7 +62,7 @@ impl Sharing {
 }
 
 impl Selection {
-    /// Whether a sub-domain with this box may have any.
+    /// Returns whether a sub-domain with this box may have hits.
     pub(super) fn may_be_in(&self, rank: u32, bounds: &Aabb) -> bool {
         let named = |list: &Option<Vec<u32>>| list.as_ref().is_none_or(|l| l.contains(&rank));
         named(&self.subdomains)
@@ -70,7 +71,7 @@ impl Selection {
             && self.may_meet(bounds)
     }
 
-    /// Whether a chunk of a sub-domain may have any.
+    /// Returns whether a chunk of a sub-domain may have hits.
     pub(super) fn may_be_among(&self, rank: u32, chunk: &TetSummary) -> bool {
         let [low, high] = chunk.bounds.map(Point::from_array);
         let [least, most] = chunk.regions;
@@ -84,36 +85,35 @@ impl Selection {
             && self.condition.as_ref().is_none_or(|e| e.may_hold(&ranges(chunk, rank)))
     }
 
-    /// Whether tetrahedra within `bounds` may be where they are asked for.
+    /// Returns whether tetrahedra within `bounds` may satisfy the conditions on places.
     pub(super) fn may_meet(&self, bounds: &Aabb) -> bool {
         self.solids.iter().all(|s| s.may_meet(bounds))
             && self.sharing.as_ref().is_none_or(|s| s.may_meet(bounds))
     }
 
-    /// Whether the faces on the surface have to be known.
+    /// Returns whether the faces on the surface are needed.
     pub(super) fn needs_surface(&self) -> bool {
         self.excess || (self.condition.as_ref()).is_some_and(|e| e.names(EXCESS))
     }
 
-    /// Whether anything is asked about places.
+    /// Returns whether there is a condition on places.
     pub(super) fn is_local(&self) -> bool {
         !self.solids.is_empty() || self.sharing.is_some()
     }
 
-    /// Whether its number and region suit.
+    /// Returns whether id and region satisfy the conditions.
     pub(super) fn may_be(&self, id: TetId, region: u32) -> bool {
         self.regions.as_ref().is_none_or(|l| l.contains(&region))
             && self.tets.as_ref().is_none_or(|l| l.contains(&id))
     }
 
-    /// Whether all that is asked of a tetrahedron's vertices holds.
+    /// Returns whether the tetrahedron satisfies the conditions on its vertices and values.
     pub(super) fn holds(&self, tet: &Hit) -> bool {
         let solid = |s: &Solid| match self.inside {
             true => s.holds(&tet.corners),
             false => s.meets(&tet.corners),
         };
-        let surface = Owner::Surface.number();
-        let is_input = |v: &u64| v >> 32 == u64::from(surface);
+        let is_input = |v: &u64| input_index(*v).is_some();
         self.solids.iter().all(solid)
             && (!self.touching_surface || tet.vertices.iter().any(is_input))
             && self.sharing.as_ref().is_none_or(|s| s.holds(tet.id, &tet.vertices))

@@ -1,4 +1,4 @@
-//! What is held open while questions are answered, within a budget.
+//! Open sub-domains and decoded chunks while questions are answered, within a budget.
 
 use std::sync::Arc;
 
@@ -9,8 +9,7 @@ use tetdb_schema::record::SealedTet;
 use super::QueryError;
 use super::decoded::{DecodedChunk, Searched};
 use super::surface_faces::SurfaceFaces;
-use super::tree::BoxTree;
-use crate::sealed::SealedError;
+use super::tree::OctalBoxTree;
 use crate::sealed::{Chunk, Subdomain};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
@@ -23,10 +22,10 @@ const PART_BYTES: u64 = 8 << 20;
 const PARTS_MAX: u64 = 64;
 /// Bytes beyond which more frames help no question.
 const FRAMES_BYTES_MAX: u64 = 2 << 30;
-/// What the summaries of a chunk take, twice, for trees.
+/// Bytes of the summaries of a chunk, twice, for trees.
 const SUMMARY_BYTES: u64 = 256;
 
-/// What questions cost.
+/// Cost of questions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Measures {
     /// Chunks of tetrahedra read, and of vertices; one read twice counts twice.
@@ -45,27 +44,47 @@ pub struct Measures {
 pub struct OpenSubdomain {
     pub subdomain: Subdomain,
     /// Over the boxes of its chunks of tetrahedra.
-    pub(super) tree: BoxTree,
+    pub(super) tree: OctalBoxTree,
     _lease: Option<Lease>,
 }
 
 /// A store open for questions.
 ///
+/// ```
+/// use tetdb_base::{expr::Expression, geom::Point, storage::Budget};
+/// use tetdb_store::query::{QuerySession, Selection, Solid, VARIABLES};
+/// use tetdb_store::store::Catalog;
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("two.tetdb");
+/// # tetdb_store::store::two_subdomains(&path)?;
+///
+/// let mut session = QuerySession::open(Catalog::open(&path)?, &Budget::new(64 << 20))?;
+/// let center = Point::splat(0.2);
+/// let located = session.locate(&[center, Point::splat(7.0)])?;
+/// assert!(located[0].found.is_some() && located[1].found.is_none());
+///
+/// let mut selection = Selection::default();
+/// selection.solids.push(Solid::Sphere { center, radius: 0.1 });
+/// selection.condition = Some(Expression::parse("quality < 3 and x > 0.1", &VARIABLES)?);
+/// assert_eq!(session.select(selection)?.count(), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// Shape: `rows` by rank. Memory: half of the budget for decoded chunks, a quarter for open sub-domains, the rest for
 /// answers on their way.
 pub struct QuerySession {
-    /// The store asked about.
+    /// The store.
     pub store: Catalog,
-    /// Its sub-domains by rank.
+    /// Sub-domains by rank.
     pub rows: Vec<SubdomainRow>,
     /// Names of labels of the surface.
     pub labels: Vec<String>,
-    /// Of region 1, 2, …; empty for one without a name.
+    /// Names of regions 1, 2, …; empty for a region without a name.
     pub region_names: Vec<String>,
     /// Embedded edges and points.
     pub wires: WiresRow,
     /// Over the boxes of the sub-domains.
-    pub(super) tree: BoxTree,
+    pub(super) tree: OctalBoxTree,
     bounds: Aabb,
     parts: LruCache<u32, OpenSubdomain>,
     parts_max: usize,
@@ -74,7 +93,7 @@ pub struct QuerySession {
     frames_bytes_max: usize,
     /// Memory left for other uses.
     pub budget: Budget,
-    /// Faces on the surface of the sub-domain asked about last, where excess is asked for.
+    /// Faces on the surface of the last sub-domain whose excess was needed.
     pub(super) surface: Option<Arc<SurfaceFaces>>,
     measures: Measures,
     /// The plane of the cut, of a mesh that was kept on its way.
@@ -88,7 +107,7 @@ impl QuerySession {
     /// Errors: damage; sub-domains that are not sealed; a budget below some ten MiB.
     pub fn open(mut store: Catalog, budget: &Budget) -> Result<Self, QueryError> {
         let rows = store.subdomains()?;
-        Self::of_rows(store, rows, budget)
+        Self::open_rows(store, rows, budget)
     }
 
     /// Opens questions to a mesh that was kept on its way.
@@ -106,12 +125,12 @@ impl QuerySession {
             return Err(QueryError::NoStage { cut, kept });
         };
         let normal = Point::from_array(row.normal);
-        let mut inquiry = Self::of_rows(store, vec![row.row.clone()], budget)?;
-        inquiry.cutting = Some([normal * row.offset, normal]);
-        Ok(inquiry)
+        let mut session = Self::open_rows(store, vec![row.row.clone()], budget)?;
+        session.cutting = Some([normal * row.offset, normal]);
+        Ok(session)
     }
 
-    fn of_rows(
+    fn open_rows(
         mut store: Catalog,
         rows: Vec<SubdomainRow>,
         budget: &Budget,
@@ -134,7 +153,7 @@ impl QuerySession {
         let bounds = (rows.iter().map(bounds_of)).fold(Aabb::EMPTY, Aabb::union);
         Ok(Self {
             store,
-            tree: BoxTree::new(rows.len(), |i| bounds_of(&rows[i])),
+            tree: OctalBoxTree::new(rows.len(), |i| bounds_of(&rows[i])),
             rows,
             labels,
             region_names,
@@ -158,7 +177,7 @@ impl QuerySession {
         self.cutting
     }
 
-    /// What all questions so far have cost.
+    /// Cost of all questions so far.
     pub fn measures(&self) -> Measures {
         let mut sum = self.measures;
         for (_, part) in &self.parts {
@@ -194,27 +213,27 @@ impl QuerySession {
             let row = self.rows.iter().find(|row| row.rank == rank);
             let row = match row {
                 Some(row) => row.clone(),
-                // Says that there is none.
+                // Returns the error.
                 None => self.store.subdomain(rank)?,
             };
             let subdomain = self.store.open_row(row, PART_BYTES as usize)?;
             let chunks = subdomain.tet_summaries().len() + subdomain.vertex_summaries().len();
             let bytes = chunks as u64 * SUMMARY_BYTES;
-            // What the share of a sub-domain does not cover.
+            // The part that the share of a sub-domain does not cover.
             let more = bytes.saturating_sub(PART_BYTES / 8);
             let lease = match more {
                 0 => None,
                 more => Some(self.budget.lease(more, "summaries of a sub-domain")?),
             };
             let tree =
-                BoxTree::new(subdomain.tet_summaries().len(), |i| chunk_bounds(&subdomain, i));
+                OctalBoxTree::new(subdomain.tet_summaries().len(), |i| chunk_bounds(&subdomain, i));
             let part = OpenSubdomain { subdomain, tree, _lease: lease };
             self.parts.put(rank, part);
         }
         Ok(self.parts.get_mut(&rank).expect("it was just put there"))
     }
 
-    /// Whether a chunk is decoded at hand.
+    /// Returns whether a chunk is decoded in memory.
     pub fn is_resident(&self, rank: u32, chunk: u32) -> bool {
         self.frames.contains(&(rank, chunk))
     }
@@ -235,7 +254,7 @@ impl QuerySession {
         Ok(searched)
     }
 
-    /// The tetrahedra of a chunk that `keep` wants, decoded.
+    /// Decodes the tetrahedra of a chunk that `keep` accepts.
     pub(super) fn frame(
         &mut self,
         rank: u32,
@@ -281,7 +300,7 @@ impl QuerySession {
     }
 }
 
-/// A chunk of tetrahedra that is what its summary says.
+/// Reads a chunk of tetrahedra and compares it with its summary.
 pub fn checked_chunk(part: &mut Subdomain, chunk: u32) -> Result<Chunk<SealedTet>, StoreError> {
     let records = part.tet_chunk(chunk)?;
     let summary = &part.tet_summaries()[chunk as usize];
@@ -292,11 +311,8 @@ pub fn checked_chunk(part: &mut Subdomain, chunk: u32) -> Result<Chunk<SealedTet
     {
         return Ok(records);
     }
-    Err(StoreError::Sealed(SealedError::Content {
-        path: part.path().to_owned(),
-        subdomain: part.id().rank(),
-        what: format!("chunk {chunk} of tetrahedra is not the one its summary tells of"),
-    }))
+    let what = format!("chunk {chunk} of tetrahedra is not the one its summary tells of");
+    Err(part.damaged(what).into())
 }
 
 /// The box of a sub-domain.
@@ -311,12 +327,12 @@ pub fn chunk_bounds(part: &Subdomain, chunk: usize) -> Aabb {
     Aabb { low, high }
 }
 
-/// How far the vertices of a chunk's tetrahedra can be from a point that one of them holds: not farther than its longest edge.
+/// Greatest distance between a point and the vertices of a chunk's tetrahedra that hold it: the longest edge of the chunk.
 pub fn reach(part: &Subdomain, chunk: usize) -> f64 {
-    /// More than what rounding takes from lengths.
+    /// Covers the rounding of lengths.
     const SLACK: f64 = 1.0 + 1e-6;
     match part.tet_summaries()[chunk].edge_max {
-        told if told > 0.0 => f64::from(told) * SLACK,
+        edge_max if edge_max > 0.0 => f64::from(edge_max) * SLACK,
         _ => f64::INFINITY,
     }
 }

@@ -14,9 +14,9 @@ pub enum Solid {
     Box(Aabb),
     /// A full sphere.
     Sphere {
-        /// Its center.
+        /// Center.
         center: Point,
-        /// Its radius, in input units.
+        /// Radius, in input units.
         radius: f64,
     },
     /// The plane through a point, orthogonal to a direction that is not zero.
@@ -32,7 +32,7 @@ pub enum Solid {
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 impl Solid {
-    /// A box around it, or `None` where it is not bounded.
+    /// A box around the solid, or `None` where it is not bounded.
     pub fn bounds(&self) -> Option<Aabb> {
         match *self {
             Self::Box(bounds) => Some(bounds),
@@ -48,7 +48,7 @@ impl Solid {
         }
     }
 
-    /// Whether a tetrahedron within `bounds` may meet it; false is certain.
+    /// Returns whether a tetrahedron within `bounds` may meet the solid; false is certain.
     pub fn may_meet(&self, bounds: &Aabb) -> bool {
         match *self {
             Self::Box(own) => own.meets(bounds),
@@ -68,7 +68,7 @@ impl Solid {
         }
     }
 
-    /// Whether the tetrahedron has a point in common with it. `corners` are positive.
+    /// Returns whether a tetrahedron has a point in common with the solid. `corners` are positive.
     pub fn meets(&self, corners: &[Point; 4]) -> bool {
         let around = Aabb::around(*corners);
         if !self.may_meet(&around) {
@@ -86,7 +86,7 @@ impl Solid {
         }
     }
 
-    /// Whether the tetrahedron lies wholly in it; never in a plane.
+    /// Returns whether a tetrahedron is wholly in the solid; never in a plane.
     pub fn holds(&self, corners: &[Point; 4]) -> bool {
         match *self {
             Self::Box(own) => {
@@ -102,7 +102,7 @@ impl Solid {
 
 fn side(point: Point, normal: Point, c: Point) -> Ordering {
     fn sign<R: Ring>(point: Point, normal: Point, c: Point) -> Option<Ordering> {
-        Vector::<R>::between(point, c).dot(&Vector::of(normal)).sign()
+        Vector::<R>::between(point, c).dot(&Vector::from_point(normal)).sign()
     }
     sign::<Near>(point, normal, c)
         .or_else(|| sign::<Dyadic>(point, normal, c))
@@ -112,16 +112,16 @@ fn side(point: Point, normal: Point, c: Point) -> Ordering {
 fn is_within(center: Point, radius: f64, c: Point) -> bool {
     fn within<R: Ring>(center: Point, radius: f64, c: Point) -> Option<bool> {
         let to = Vector::<R>::between(center, c);
-        not_negative(&R::of(radius).times(&R::of(radius)).minus(&to.dot(&to)))
+        not_negative(&R::from_f64(radius).times(&R::from_f64(radius)).minus(&to.dot(&to)))
     }
     within::<Near>(center, radius, c)
         .or_else(|| within::<Dyadic>(center, radius, c))
         .expect("exact signs are known")
 }
 
-/// Whether a ball meets a tetrahedron: the center is in it, or a corner, edge or face is near enough.
+/// Returns whether a ball meets a tetrahedron: the center is in it, or a corner, edge or face is near enough.
 ///
-/// Each clause is a truth about the nearest point being there and its distance; `None` when a sign is not known.
+/// Each test is about the position and distance of a nearest point; `None` when a sign is not known.
 fn ball_meets<R: Ring>(center: Point, radius: f64, corners: &[Point; 4]) -> Option<bool> {
     let behind = |f: &[usize; 3]| {
         let [a, b, c] = f.map(|i| corners[i]);
@@ -131,7 +131,7 @@ fn ball_meets<R: Ring>(center: Point, radius: f64, corners: &[Point; 4]) -> Opti
     if FACES.iter().all(behind) {
         return Some(true);
     }
-    let square = R::of(radius).times(&R::of(radius));
+    let square = R::from_f64(radius).times(&R::from_f64(radius));
     let to: [Vector<R>; 4] = corners.map(|c| Vector::between(c, center));
     let mut doubt = false;
     let mut settle = |answer: Option<bool>| {
@@ -180,7 +180,7 @@ fn face_is_near<R: Ring>([a, b, c]: [Point; 3], to: [&Vector<R>; 3], square: &R)
     and(above, not_negative(&reach.minus(&height.times(&height))))
 }
 
-/// Both, where that is known: one that is false decides.
+/// Conjunction where it is known: one false operand decides.
 fn and(a: Option<bool>, b: Option<bool>) -> Option<bool> {
     match (a, b) {
         (Some(false), _) | (_, Some(false)) => Some(false),
@@ -189,7 +189,7 @@ fn and(a: Option<bool>, b: Option<bool>) -> Option<bool> {
     }
 }
 
-/// Whether a box meets a tetrahedron: no face plane and no direction orthogonal to an edge of each keeps them apart.
+/// Returns whether a box meets a tetrahedron: no face plane and no direction orthogonal to an edge of each separates them.
 ///
 /// The box is first cut to that of the tetrahedron, which changes nothing and brings its numbers near.
 fn box_meets(own: &Aabb, around: &Aabb, corners: &[Point; 4]) -> bool {
@@ -208,7 +208,7 @@ fn box_meets(own: &Aabb, around: &Aabb, corners: &[Point; 4]) -> bool {
     (0..3).all(|axis| EDGES.iter().all(|edge| !apart_along(axis, *edge, corners, &ends, height)))
 }
 
-/// Whether, seen along an axis, the line through an edge has the tetrahedron on one side and the box beyond.
+/// Returns whether, seen along an axis, the line through an edge has the tetrahedron on one side and the box on the other.
 fn apart_along(
     axis: usize,
     [i, j]: [usize; 2],

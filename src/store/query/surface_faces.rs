@@ -1,4 +1,4 @@
-//! Which faces of a sub-domain's tetrahedra are required, input triangles and what holds embedded edges: what their excess depends on.
+//! Required faces of a sub-domain's tetrahedra, on which their excess depends: input triangles, and support triangles of embedded edges.
 
 use tetdb_schema::record::{NO_TET, SealedTet};
 
@@ -6,7 +6,7 @@ use crate::sealed::{Subdomain, face_of};
 use crate::store::StoreError;
 use tetdb_base::storage::{Lease, check_cancelled};
 
-/// The faces of one sub-domain that are required.
+/// The required faces of one sub-domain.
 pub struct SurfaceFaces {
     pub rank: u32,
     /// A tetrahedron and the vertices of one of its faces, sorted.
@@ -15,12 +15,12 @@ pub struct SurfaceFaces {
 }
 
 impl SurfaceFaces {
-    /// Bytes for those of a sub-domain.
+    /// Bytes of the faces of a sub-domain.
     pub fn bytes(part: &Subdomain) -> u64 {
         2 * part.row().facets * size_of::<(u32, [u32; 3])>() as u64
     }
 
-    /// Reads those of a sub-domain; `lease` is for [`SurfaceFaces::bytes`]. Errors: damage.
+    /// Reads the faces of a sub-domain; `lease` is for [`SurfaceFaces::bytes`]. Errors: damage.
     pub fn read(part: &mut Subdomain, lease: Lease) -> Result<Self, StoreError> {
         let mut faces = Vec::with_capacity(2 * part.row().facets as usize);
         for chunk in 0..part.row().chunks[2] {
@@ -34,7 +34,7 @@ impl SurfaceFaces {
         Ok(Self { rank: part.id().rank(), faces, _lease: lease })
     }
 
-    /// Whether each face of a tetrahedron, number `local`, is required.
+    /// Marks the required faces of a tetrahedron, number `local`.
     pub fn of(&self, local: u32, tet: &SealedTet) -> [bool; 4] {
         let mut on_surface = [false; 4];
         let first = self.faces.partition_point(|face| face.0 < local);

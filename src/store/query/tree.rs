@@ -1,4 +1,4 @@
-//! Boxes under boxes: which of many boxes, near each other when their numbers are, meet a place.
+//! A tree of boxes over items whose neighbors in number are near in space.
 
 use tetdb_base::geom::Aabb;
 
@@ -7,13 +7,13 @@ const FAN: usize = 8;
 
 /// Shape: `levels[0][i]` = box around items `8 i..8 i + 8`; each level above holds eight boxes of the one below.
 ///
-/// Items themselves are not kept: whoever asks looks at the eight.
-pub(super) struct BoxTree {
+/// Items themselves are not kept: callers test the eight.
+pub(super) struct OctalBoxTree {
     levels: Vec<Vec<Aabb>>,
     n: usize,
 }
 
-impl BoxTree {
+impl OctalBoxTree {
     /// Over `n` items.
     pub fn new(n: usize, item: impl Fn(usize) -> Aabb) -> Self {
         let around = |boxes: &mut dyn Iterator<Item = Aabb>| boxes.fold(Aabb::EMPTY, Aabb::union);
@@ -76,7 +76,7 @@ mod tests {
                 let low = Point::splat(i as f64);
                 Aabb { low, high: low + 1.5 }
             };
-            let tree = BoxTree::new(n, item);
+            let tree = OctalBoxTree::new(n, item);
             for at in [-1.0, 0.0, 3.25, 500.0, 1002.0] {
                 let mut found = Vec::new();
                 let holds = |b: &Aabb| b.low.x <= at && at <= b.high.x;

@@ -1,6 +1,6 @@
 //! Coarse snapshots: the working meshes that sub-domains are meshed from, kept so that they can be meshed again.
 //!
-//! A leaf has a file of its own, so that damage to a sealed sub-domain does not reach what mends it.
+//! A snapshot has a file of its own, so that damage to a sealed sub-domain does not reach its snapshot.
 
 use std::path::Path;
 
@@ -43,7 +43,7 @@ impl CoarseWriter {
         Ok(Self {
             path: path.clone(),
             file: StoreFile::create_unsynced(path, memory_bytes / 2)?,
-            batch: Batch::of(memory_bytes),
+            batch: Batch::new(memory_bytes),
             rank,
             generation,
             vertices: Packer::new(rank, generation).map_err(io)?,
@@ -53,27 +53,27 @@ impl CoarseWriter {
         })
     }
 
-    /// The next vertex. Errors: the disk.
+    /// Adds a vertex. Errors: the disk.
     pub fn push_vertex(&mut self, vertex: CoarseVertex) -> Result<(), SealedError> {
         push(&mut self.file, &mut self.batch, &mut self.vertices, vertex)
     }
 
-    /// The next tetrahedron. Errors: the disk.
+    /// Adds a tetrahedron. Errors: the disk.
     pub fn push_tet(&mut self, tet: CoarseTet) -> Result<(), SealedError> {
         push(&mut self.file, &mut self.batch, &mut self.tets, tet)
     }
 
-    /// The next facet. Errors: the disk.
+    /// Adds a facet. Errors: the disk.
     pub fn push_facet(&mut self, facet: Facet) -> Result<(), SealedError> {
         push(&mut self.file, &mut self.batch, &mut self.facets, facet)
     }
 
-    /// The next interface face. Errors: the disk.
+    /// Adds an interface face. Errors: the disk.
     pub fn push_face(&mut self, face: CoarseFace) -> Result<(), SealedError> {
         push(&mut self.file, &mut self.batch, &mut self.faces, face)
     }
 
-    /// Writes what is left, shrinks the file and closes it; returns its row. Errors: the disk.
+    /// Writes the remaining records, shrinks the file and closes it; returns its row. Errors: the disk.
     pub fn finish(mut self) -> Result<CoarseRow, SealedError> {
         let (file, batch) = (&mut self.file, &mut self.batch);
         end(file, batch, &mut self.vertices)?;
@@ -140,27 +140,24 @@ impl CoarseSnapshot {
     /// Errors: damage.
     pub fn open(path: &DiskPath, row: CoarseRow, cache_bytes: usize) -> Result<Self, SealedError> {
         if !path.is_file() {
-            return Err(SealedError::Content {
-                path: path.path().to_owned(),
-                subdomain: row.rank,
-                what: "the file of its coarse snapshot is missing".to_owned(),
-            });
+            let what = "the file of its coarse snapshot is missing";
+            return Err(SealedError::content(path.path(), row.rank, what));
         }
         let file = StoreFile::open_repaired(path, cache_bytes, false)?;
         Ok(Self { row, file })
     }
 
-    /// Its row in the catalog.
+    /// Row of the snapshot in the catalog.
     pub fn row(&self) -> &CoarseRow {
         &self.row
     }
 
-    /// Where its file is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         self.file.path()
     }
 
-    /// Compares its whole file with redb's checksums. Errors: damage.
+    /// Compares the whole file with redb's checksums. Errors: damage.
     pub fn check(&self) -> Result<(), SealedError> {
         Ok(self.file.check()?)
     }

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use tetdb_base::storage::StorageError;
 
-/// What can be wrong with the file of a sub-domain.
+/// Errors of the file of a sub-domain.
 #[derive(Debug, Error)]
 pub enum SealedError {
     /// The sub-domain is not sealed yet.
@@ -21,7 +21,7 @@ pub enum SealedError {
     Chunk {
         /// The file or folder.
         path: PathBuf,
-        /// What the cause was.
+        /// The cause.
         #[source]
         source: ChunkError,
     },
@@ -32,7 +32,7 @@ pub enum SealedError {
         path: PathBuf,
         /// Rank of the sub-domain.
         subdomain: u32,
-        /// What of it.
+        /// The contradiction.
         what: String,
     },
     /// The file itself.
@@ -41,13 +41,18 @@ pub enum SealedError {
 }
 
 impl SealedError {
-    /// Whether what is on disk is not what was written.
+    /// Returns whether the file was changed after it was written.
     pub fn is_damage(&self) -> bool {
         match self {
             Self::Chunk { .. } | Self::Content { .. } => true,
             Self::Storage(error) => error.is_damage(),
             Self::NotSealed { .. } => false,
         }
+    }
+
+    /// Damage in the file of a sub-domain, or in `path` as a whole.
+    pub fn content(path: &Path, subdomain: u32, what: impl Into<String>) -> Self {
+        Self::Content { path: path.to_owned(), subdomain, what: what.into() }
     }
 
     /// Wraps a failed operation on `path`.

@@ -11,26 +11,26 @@ pub fn sorted_face([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
     ([low.min(mid), low.max(mid), top], ab ^ bc ^ (low > mid))
 }
 
-/// Which face of a tetrahedron has these three of its vertices: the one opposite the vertex it lacks.
+/// Marks the face of a tetrahedron that has these three of its vertices: the one opposite the fourth vertex.
 pub fn face_of(face: [u32; 3], nodes: [u32; 4]) -> [bool; 4] {
     nodes.map(|v| !face.contains(&v))
 }
 
-/// What became of a face that was added.
+/// The result of adding a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paired {
-    /// It is the first of its vertices.
+    /// The face is the first with its vertices.
     Open,
-    /// It closes the face with this reference.
+    /// The face is the other side of the face with this reference.
     With(u32),
-    /// The same side was already there, in the face with this reference.
+    /// The face with this reference has the same side.
     Same(u32),
-    /// Both sides were already there.
+    /// Both sides were added before.
     Third,
 }
 
 #[derive(Clone, Copy)]
-struct Entry {
+struct FaceEntry {
     face: [u32; 3],
     /// `reference << 1 | parity`, or one of the two markers.
     reference: u32,
@@ -38,17 +38,17 @@ struct Entry {
 
 const VACANT: u32 = u32::MAX;
 const CLOSED: u32 = u32::MAX - 1;
-/// Slots by which the faces of the next vertex begin later, a power of two: about three for each face that has a vertex as its smallest.
+/// Distance in slots between the faces of successive vertices, a power of two: about three for each face that has a vertex as its smallest.
 const VERTEX_SLOTS: u32 = 32;
-/// Slots looked at side by side; then all over the table, for a vertex may have any number of faces.
+/// Number of neighboring slots that are tried first; later steps go all over the table, because a vertex may have any number of faces.
 const NEAR: u32 = 16;
 
 /// An open table of faces, for up to some hundred thousand at a time.
 ///
-/// Faces of near smallest vertices lie side by side: tetrahedra that come along a curve find them in the cache.
-/// Invariant: at most half full. Order: what it returns depends on the faces alone.
+/// Faces of close smallest vertices are close in the table, so tetrahedra along a curve find them in the cache.
+/// Invariant: at most half full. The results depend on the order of the faces alone.
 pub struct FacePairs {
-    entries: Vec<Entry>,
+    entries: Vec<FaceEntry>,
     used: usize,
 }
 
@@ -56,7 +56,7 @@ impl FacePairs {
     /// A table for the faces of `tets` tetrahedra.
     pub fn new(tets: usize) -> Self {
         let slots = (tets * 8).next_power_of_two().max(16);
-        let vacant = Entry { face: [0; 3], reference: VACANT };
+        let vacant = FaceEntry { face: [0; 3], reference: VACANT };
         Self { entries: vec![vacant; slots], used: 0 }
     }
 
@@ -77,7 +77,7 @@ impl FacePairs {
         loop {
             let entry = &mut self.entries[at];
             if entry.reference == VACANT {
-                *entry = Entry { face, reference: reference << 1 | u32::from(odd) };
+                *entry = FaceEntry { face, reference: reference << 1 | u32::from(odd) };
                 self.used += 1;
                 assert!(self.used * 2 <= mask + 1, "the table is for fewer faces");
                 return Paired::Open;
@@ -94,7 +94,7 @@ impl FacePairs {
                 return Paired::With(other);
             }
             looked_at += 1;
-            // Odd, so that it comes by all slots.
+            // Odd, so that the steps reach all slots.
             let step = if looked_at < NEAR { 1 } else { hash >> 20 | 1 };
             at = at.wrapping_add(step as usize) & mask;
         }

@@ -1,6 +1,6 @@
 //! The two forms of a finished sub-domain: sealed chunks, and working pages.
 //!
-//! Both hold the same records in the same order under the same numbers, so whoever reads sees no difference.
+//! Both hold the same records in the same order under the same numbers, and readers return the same.
 
 use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, Packed, Packer};
 use tetdb_schema::leaf::{PageDecoder, PagePacker, PageRecord, PageSet, Working};
@@ -28,7 +28,7 @@ impl Word for Form {
 
 impl Form {
     /// The form of a finished sub-domain; `None` for one that is not finished.
-    pub fn of(state: SubdomainState) -> Option<Self> {
+    pub fn from_state(state: SubdomainState) -> Option<Self> {
         match state {
             SubdomainState::Sealed => Some(Self::Packed),
             SubdomainState::Optimized => Some(Self::Pages),
@@ -90,7 +90,7 @@ impl<R: PageRecord> Cutter<R> {
         })
     }
 
-    /// Takes a record; `working` says what it is in a page. Errors: those of zstd.
+    /// Takes a record; `working` converts it for a page. Errors: those of zstd.
     #[inline]
     pub fn push(
         &mut self,
@@ -103,7 +103,7 @@ impl<R: PageRecord> Cutter<R> {
         })
     }
 
-    /// What is left, some at a time. Errors: those of zstd.
+    /// Cuts the remaining records, one chunk or page at a time. Errors: those of zstd.
     pub fn cut(&mut self) -> std::io::Result<Option<Cut<R>>> {
         Ok(match self {
             Self::Chunks(packer) => packer.cut()?.map(Cut::from),
@@ -132,14 +132,14 @@ impl<R: PageRecord> Cutter<R> {
 type ReadPage<R> =
     fn(&mut StoreFile, &mut PageDecoder, ChunkAddress, &mut Vec<R>) -> Result<u32, SealedError>;
 
-/// Reads what a [`Cutter`] cut.
+/// Reads the chunks or pages of a [`Cutter`].
 pub(super) enum Loader<R> {
     Chunks(Decoder<R>),
     Pages { frames: PageDecoder, read: ReadPage<R> },
 }
 
 impl<R: ChunkRecord> Loader<R> {
-    /// Of chunks. Errors: those of zstd.
+    /// A loader of chunks. Errors: those of zstd.
     pub fn chunks() -> std::io::Result<Self> {
         Ok(Self::Chunks(Decoder::new()?))
     }
@@ -165,8 +165,8 @@ impl<R: ChunkRecord> Loader<R> {
 }
 
 impl<R: PageRecord> Loader<R> {
-    /// Of a sub-domain's records in either form. Errors: those of zstd.
-    pub fn of(form: Form, (subdomain, generation): (u32, u32)) -> std::io::Result<Self> {
+    /// A loader of a sub-domain's records in either form. Errors: those of zstd.
+    pub fn new(form: Form, (subdomain, generation): (u32, u32)) -> std::io::Result<Self> {
         Ok(match form {
             Form::Packed => Self::chunks()?,
             Form::Pages => Self::Pages {
@@ -178,11 +178,8 @@ impl<R: PageRecord> Loader<R> {
 }
 
 fn missing(file: &StoreFile, address: ChunkAddress, what: &str) -> SealedError {
-    SealedError::Content {
-        path: file.path().to_owned(),
-        subdomain: address.subdomain,
-        what: format!("{:?} {what} {} is missing", address.kind, address.chunk),
-    }
+    let what = format!("{:?} {what} {} is missing", address.kind, address.chunk);
+    SealedError::content(file.path(), address.subdomain, what)
 }
 
 fn read_page<R: PageRecord>(

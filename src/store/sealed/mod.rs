@@ -7,23 +7,29 @@
 #![warn(missing_docs)]
 
 mod batch;
+mod bit_set;
 mod coarse_snapshot;
 mod error;
+mod face_join;
 mod face_pairs;
 mod form;
+mod merge_reader;
 mod shape;
 mod subdomain;
 mod totals;
 mod vertex_cache;
 mod writer;
 
+pub use bit_set::BitSet;
 pub use coarse_snapshot::{CoarseSnapshot, CoarseWriter};
 pub use error::SealedError;
+pub use face_join::{FaceJoin, FaceJoinSorter, JoinedFace};
 pub use face_pairs::{FacePairs, Paired, face_of, sorted_face};
 pub use form::Form;
+pub use merge_reader::MergeReader;
 pub use shape::{Shape, quality_bin};
 pub use subdomain::{Chunk, Chunks, Subdomain};
 pub use totals::RegionTotals;
-pub use totals::Totals;
-pub use vertex_cache::{Corner, VertexCache};
+pub use totals::SubdomainTotals;
+pub use vertex_cache::{Corner, VertexCache, input_index};
 pub use writer::{InterfaceSide, Sealed, SealedWriter};

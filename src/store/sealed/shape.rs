@@ -9,7 +9,7 @@ use tetdb_base::geom::Point;
 /// Units: volume in cubed lengths of the input. Not exact: validity is decided by `geom::orient`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape {
-    /// Of the tetrahedron, with its sign.
+    /// Signed volume.
     pub volume: f64,
     /// q = (sqrt(6)/12) * longest edge / inradius; infinite when the volume is not positive.
     pub quality: f64,
@@ -20,13 +20,13 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Of the positive tetrahedron with these corners. What the caller does not use is not computed.
+    /// Measures the positive tetrahedron with these corners. Unused results are not computed.
     #[inline]
-    pub fn of(corners: [Point; 4]) -> Self {
+    pub fn new(corners: [Point; 4]) -> Self {
         Self::with(corners, cosines)
     }
 
-    /// The same for those who look for extremes: of cosines that are not beyond `known`, `known` is told, for they take six divisions.
+    /// Like [`Shape::new`], but skips the six divisions of the cosines and returns `known` unless one may exceed these extremes.
     #[inline]
     pub(super) fn beyond(corners: [Point; 4], known: [f64; 2]) -> Self {
         Self::with(corners, |normals, lengths| {
@@ -49,7 +49,7 @@ impl Shape {
         let (ab, ac, ad, bc, bd) = (b - a, c - a, d - a, c - b, d - b);
         // Twice the areas, outward.
         let normals = [bc.cross(bd), ad.cross(ac), ab.cross(ad), ac.cross(ab)];
-        // Not by `map`, which calls a function for each.
+        // No `map`, which would call a function for each.
         let [e, f, g, h] = &normals;
         let lengths = [e.length(), f.length(), g.length(), h.length()];
         let six_volumes = ab.dot(ac.cross(ad));
@@ -72,7 +72,7 @@ impl Shape {
 
 /// The pairs of faces.
 const PAIRS: [(usize, usize); 6] = [(1, 0), (2, 0), (2, 1), (3, 0), (3, 1), (3, 2)];
-/// More than rounding makes of a cosine.
+/// Bound of the rounding of a cosine.
 const ROUNDING: f64 = 1e-15;
 
 #[inline]
@@ -85,7 +85,7 @@ fn cosines(normals: &[Point; 4], lengths: &[f64; 4]) -> [f64; 2] {
     cosines
 }
 
-/// The bin of a quality; what is no number, as of a vertex without a place, is in the worst.
+/// The bin of a quality; NaN, as of a vertex without a position, is in the worst bin.
 pub fn quality_bin(quality: f64) -> usize {
     if quality.is_nan() {
         return QUALITY_BINS - 1;
@@ -110,7 +110,7 @@ mod tests {
             // A hundredth are flat, some altogether.
             let flat = [1.0, 1e-9, 0.0][if k % 100 == 0 { k / 100 % 3 } else { 0 }];
             let p = [0; 4].map(|_| Point::new(next(), next(), flat * next()));
-            let (whole, beyond) = (Shape::of(p), Shape::beyond(p, known));
+            let (whole, beyond) = (Shape::new(p), Shape::beyond(p, known));
             let same = |f: fn(&Shape) -> f64| f(&whole).to_bits() == f(&beyond).to_bits();
             assert!(same(|s| s.volume) && same(|s| s.quality) && same(|s| s.edge_max));
             skipped += usize::from(beyond.cosines == known);
@@ -128,8 +128,8 @@ mod tests {
         let p = [[1., 1., 1.], [1., -1., -1.], [-1., 1., -1.], [-1., -1., 1.]];
         for scale in [1e-9, 1.0, 1e9] {
             let [a, b, c, d] = p.map(|p| Point::from_array(p) * scale);
-            let shape = Shape::of([a, c, b, d]);
-            let shape = if shape.volume > 0.0 { shape } else { Shape::of([a, b, c, d]) };
+            let shape = Shape::new([a, c, b, d]);
+            let shape = if shape.volume > 0.0 { shape } else { Shape::new([a, b, c, d]) };
             assert!((shape.quality - 1.0).abs() < 1e-12, "{shape:?}");
             assert!((shape.volume / scale.powi(3) - 8.0 / 3.0).abs() < 1e-12);
             for cosine in shape.cosines {

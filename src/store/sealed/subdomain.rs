@@ -48,22 +48,18 @@ pub struct Chunks<'a, R> {
 impl Subdomain {
     /// Opens the sub-domain of `row` at `path` with `memory_bytes` for redb's cache and decoded vertices.
     ///
-    /// The row may be that of a stage that was kept. Errors: [`SealedError::NotSealed`]; damage.
+    /// The row may be that of a kept stage. Errors: [`SealedError::NotSealed`]; damage.
     pub fn open(
         path: &DiskPath,
         row: SubdomainRow,
         memory_bytes: usize,
     ) -> Result<Self, SealedError> {
         let rank = row.rank;
-        let form = Form::of(row.state).ok_or_else(|| SealedError::NotSealed {
+        let form = Form::from_state(row.state).ok_or_else(|| SealedError::NotSealed {
             path: path.path().to_owned(),
             subdomain: rank,
         })?;
-        let damaged = |what: String| SealedError::Content {
-            path: path.path().to_owned(),
-            subdomain: rank,
-            what,
-        };
+        let damaged = |what: String| SealedError::content(path.path(), rank, what);
         let id = SubdomainId::new(rank).ok_or_else(|| damaged("its rank is too high".into()))?;
         if !path.is_file() {
             return Err(damaged("its file is missing".into()));
@@ -71,7 +67,7 @@ impl Subdomain {
         let mut file = StoreFile::open_repaired(path, memory_bytes / 2, false)?;
         let tet_chunks = summaries::<TetSummary>(&mut file, &row)?;
         let vertex_chunks = summaries::<VertexSummary>(&mut file, &row)?;
-        // Nobody asks these yet, but damage in them is damage too.
+        // These are read only because damage in them is damage too.
         let facets = summaries::<RangeSummary<false>>(&mut file, &row)?;
         let faces = summaries::<RangeSummary<true>>(&mut file, &row)?;
         let tets = n_records(tet_chunks.iter().map(|s| [s.first, s.count]));
@@ -113,26 +109,31 @@ impl Subdomain {
         })
     }
 
-    /// Compares its whole file with redb's checksums; chunks have their own, which are compared whenever one is read.
+    /// Compares the whole file with redb's checksums; chunks have their own checksums, which are compared at every read.
     ///
     /// Errors: damage.
     pub fn check(&self) -> Result<(), SealedError> {
         Ok(self.file.check()?)
     }
 
-    /// Its rank.
+    /// Rank of the sub-domain.
     pub fn id(&self) -> SubdomainId {
         self.id
     }
 
-    /// Its row in the catalog.
+    /// Row of the sub-domain in the catalog.
     pub fn row(&self) -> &SubdomainRow {
         &self.row
     }
 
-    /// Where its file is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         self.file.path()
+    }
+
+    /// Damage in the file of the sub-domain.
+    pub fn damaged(&self, what: impl Into<String>) -> SealedError {
+        SealedError::content(self.path(), self.id.rank(), what)
     }
 
     /// Summaries of the chunks of tetrahedra.
@@ -180,10 +181,8 @@ impl Subdomain {
         let path = self.file.path().to_owned();
         flatten(self.tet_chunks()).map(move |item| {
             let (place, tet) = item?;
-            let id = TetId::new(id, place).ok_or_else(|| SealedError::Content {
-                path: path.clone(),
-                subdomain: id.rank(),
-                what: format!("tetrahedron {place} has no id"),
+            let id = TetId::new(id, place).ok_or_else(|| {
+                SealedError::content(&path, id.rank(), format!("tetrahedron {place} has no id"))
             })?;
             Ok((id, tet))
         })
@@ -260,7 +259,7 @@ impl Subdomain {
         Chunks {
             address: address::<R>(&self.row),
             end: n_chunks::<R>(&self.row),
-            loader: Loader::of(self.form, (self.row.rank, self.row.generation))
+            loader: Loader::new(self.form, (self.row.rank, self.row.generation))
                 .expect("zstd makes a context whenever there is memory"),
             file: &mut self.file,
             expected: 0,
@@ -278,7 +277,7 @@ fn n_chunks<R: ChunkRecord>(row: &SubdomainRow) -> u32 {
     row.chunks[place.expect("every kind is listed")]
 }
 
-/// Records in chunks that begin at and hold so many; `None` when one does not begin where the one before ends.
+/// Number of records in chunks of these first records and counts; `None` if a chunk does not begin at the end of the one before.
 fn n_records(mut chunks: impl Iterator<Item = [u32; 2]>) -> Option<u64> {
     chunks.try_fold(0, |n, [first, count]| (u64::from(first) == n).then_some(n + u64::from(count)))
 }
@@ -329,11 +328,7 @@ impl<R: ChunkRecord> Chunks<'_, R> {
     }
 
     fn contradiction(&self, what: String) -> SealedError {
-        SealedError::Content {
-            path: self.file.path().to_owned(),
-            subdomain: self.address.subdomain,
-            what,
-        }
+        SealedError::content(self.file.path(), self.address.subdomain, what)
     }
 }
 

@@ -1,4 +1,4 @@
-//! What is summed over the tetrahedra of a sub-domain while it is written.
+//! Sums over the tetrahedra of a sub-domain while it is written.
 
 use std::collections::BTreeMap;
 
@@ -15,51 +15,51 @@ use tetdb_schema::catalog::QualityRow;
 /// Tetrahedra whose corners are held at once.
 const PIECE: usize = 4096;
 
-/// What is summed over tetrahedra, in their order.
-pub struct Totals {
-    /// Of the tetrahedra.
+/// Sums over tetrahedra, in their order.
+pub struct SubdomainTotals {
+    /// Digest of the tetrahedra.
     pub digest: Digest,
-    /// Of the vertices; whoever has them sets it.
+    /// Bounds of the vertices, set by the caller.
     pub bounds: Aabb,
     /// As in [`QualityRow`].
     pub bins: [u64; QUALITY_BINS],
     /// Greatest quality.
     pub worst: f64,
-    /// The first that has it.
+    /// The first tetrahedron of the greatest quality.
     pub worst_tet: u32,
     /// Least and greatest cosine of a dihedral angle.
     pub cosines: [f64; 2],
-    /// Sum in order.
+    /// Sum of the volumes, in order.
     pub volume: f64,
-    /// By number.
+    /// Sums of the regions by number.
     pub regions: BTreeMap<u32, RegionTotals>,
-    /// Of the piece at hand; kept, for memory that is asked for anew is cleared by the system each time.
-    corners: Vec<[Spot; 4]>,
+    /// Vertices of the current piece; kept, because the system clears newly allocated memory.
+    corners: Vec<[VertexSum; 4]>,
     shapes: Vec<Shape>,
 }
 
-/// What is summed of a vertex.
+/// The parts of a vertex that are summed.
 #[derive(Clone, Copy)]
-struct Spot {
+struct VertexSum {
     point: Point,
     mix: u64,
 }
 
-impl Spot {
+impl VertexSum {
     #[inline(always)]
-    fn of(corner: &Corner) -> Self {
+    fn new(corner: &Corner) -> Self {
         Self { point: corner.point, mix: corner.mix }
     }
 }
 
-/// Tetrahedra of one region that follow each other: the map of regions is asked once for all.
+/// Consecutive tetrahedra of one region, so that the map of regions is searched once.
 struct RegionRun {
     region: u32,
     totals: RegionTotals,
 }
 
 impl RegionRun {
-    fn of(region: u32, regions: &BTreeMap<u32, RegionTotals>) -> Self {
+    fn begin(region: u32, regions: &BTreeMap<u32, RegionTotals>) -> Self {
         let totals = regions.get(&region).copied().unwrap_or_default();
         Self { region, totals }
     }
@@ -69,8 +69,8 @@ impl RegionRun {
     }
 }
 
-/// Extends a box to a point: one instruction for each side, where a minimum that knows what is no number takes four. Coordinates that are
-/// none are left out here too.
+/// Extends a box to a point with one instruction for each side; a minimum that treats NaN takes four. Coordinates that are
+/// NaN are left out here too.
 #[inline(always)]
 fn extend(bounds: &mut Aabb, p: Point) {
     let less = |a: f64, b: f64| if a < b { a } else { b };
@@ -108,8 +108,8 @@ pub(super) fn count_open(pairs: &mut FacePairs, tets: &[SealedTet]) -> u32 {
     open
 }
 
-/// Of nothing.
-impl Default for Totals {
+/// Sums of no tetrahedra.
+impl Default for SubdomainTotals {
     fn default() -> Self {
         Self {
             digest: Digest::default(),
@@ -126,8 +126,8 @@ impl Default for Totals {
     }
 }
 
-impl Totals {
-    /// Adds a chunk and returns its summary, but for what only its bytes and faces tell.
+impl SubdomainTotals {
+    /// Adds a chunk and returns its summary without the number of open faces and the bytes.
     ///
     /// Errors: those of `corners_of`.
     pub fn add<E>(
@@ -152,14 +152,19 @@ impl Totals {
         };
         let mut buffers = (std::mem::take(&mut self.corners), std::mem::take(&mut self.shapes));
         let (corners, shapes) = (&mut buffers.0, &mut buffers.1);
-        // Rounded once: what is rounded keeps its order.
+        // Rounded once at the end: rounding keeps the order.
         let (mut quality, mut edge_max) = ([f64::INFINITY, 0.0f64], 0.0f64);
         // A piece at a time: the corners of a whole chunk would take ten times its bytes.
         for (piece, first) in tets.chunks(PIECE).zip((first..).step_by(PIECE)) {
             corners.clear();
             for tet in piece {
                 let [a, b, c, d] = &corners_of(tet)?;
-                corners.push([Spot::of(a), Spot::of(b), Spot::of(c), Spot::of(d)]);
+                corners.push([
+                    VertexSum::new(a),
+                    VertexSum::new(b),
+                    VertexSum::new(c),
+                    VertexSum::new(d),
+                ]);
             }
             // Shapes in parallel, sums in order: the same for any number of threads.
             let known = self.cosines;
@@ -167,7 +172,7 @@ impl Totals {
                 Shape::beyond([a.point, b.point, c.point, d.point], known)
             });
             let known = piece.iter().zip(&*corners).zip(&*shapes);
-            let mut run = RegionRun::of(piece[0].region, &self.regions);
+            let mut run = RegionRun::begin(piece[0].region, &self.regions);
             for (place, ((tet, corners), shape)) in (first..).zip(known) {
                 let [a, b, c, d] = corners;
                 self.digest.add_tet([a.mix, b.mix, c.mix, d.mix], tet.region, rank);
@@ -175,7 +180,7 @@ impl Totals {
                 self.add_shape(place, shape);
                 if run.region != tet.region {
                     run.end(&mut self.regions);
-                    run = RegionRun::of(tet.region, &self.regions);
+                    run = RegionRun::begin(tet.region, &self.regions);
                 }
                 run.totals.tets += 1;
                 run.totals.volume += shape.volume;
@@ -221,11 +226,11 @@ impl Totals {
     }
 }
 
-/// What a region has in this sub-domain.
+/// Sums of a region in this sub-domain.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct RegionTotals {
-    /// Its tetrahedra.
+    /// Number of tetrahedra.
     pub tets: u64,
-    /// Summed in the sealed order.
+    /// Volume, summed in the sealed order.
     pub volume: f64,
 }

@@ -3,6 +3,7 @@
 use lru::LruCache;
 use tetdb_schema::chunk::{ChunkAddress, ChunkKind};
 use tetdb_schema::digest::vertex_mix;
+use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::SealedVertex;
 
 use super::Form;
@@ -11,44 +12,59 @@ use super::form::Loader;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::StoreFile;
 
-/// Chunks kept whatever the budget: a tetrahedron needs four at once.
+/// Chunks kept with any budget: a tetrahedron needs four at once.
 const CHUNKS_LEAST: usize = 4;
 const NOT_RESIDENT: u32 = u32::MAX;
 
-/// A vertex as an algorithm wants it.
+/// A decoded vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
-    /// Its position.
+    /// Position.
     pub point: Point,
-    /// Its mix in the digest.
+    /// Mix of the position in the digest.
     pub mix: u64,
-    /// Its name for ever, as a number.
+    /// Lasting id as a number.
     pub id: u64,
     /// One of [`tag`](tetdb_schema::record::tag).
     pub tag: u32,
-    /// The edge length wanted there; 0 where none was.
+    /// Wanted edge length; 0 where there is none.
     pub h: f32,
+}
+
+impl Corner {
+    /// Number of the vertex in the input; `None` for a vertex that is not the input's.
+    #[inline]
+    pub fn input_index(&self) -> Option<u32> {
+        input_index(self.id)
+    }
+}
+
+/// The number in the input of the vertex with this lasting id; `None` for a vertex that is not the input's.
+#[inline]
+pub fn input_index(id: u64) -> Option<u32> {
+    let id = VertexId::from_number(id)?;
+    (id.owner == Owner::Surface).then_some(id.index)
 }
 
 /// The vertices of a resident chunk.
 #[derive(Clone, Copy)]
-struct Window {
+struct ResidentChunk {
     chunk: u32,
-    /// Vertices from this one on, below that.
+    /// First vertex, and one after the last.
     first: u32,
     end: u32,
     /// Place in `resident`.
     place: u32,
 }
 
-impl Window {
+impl ResidentChunk {
     const EMPTY: Self = Self { chunk: NOT_RESIDENT, first: 0, end: 0, place: 0 };
 }
 
 /// Decoded vertex chunks within a budget.
 ///
-/// Turning to a chunk other than the last two sets its reference bit; the `lru` crate orders the chunks when one is missed, and a chunk
-/// whose bit is set gets a second chance. Shape: `firsts[i]` = number of the first vertex of chunk `i`.
+/// Using a chunk other than the last two sets its reference bit. The `lru` crate orders the chunks when one is missed, and a chunk
+/// whose bit is set is kept a second time. Shape: `firsts[i]` = number of the first vertex of chunk `i`.
 pub struct VertexCache {
     subdomain: u32,
     generation: u32,
@@ -62,8 +78,8 @@ pub struct VertexCache {
     order: LruCache<u32, ()>,
     loader: Loader<SealedVertex>,
     scratch: Vec<SealedVertex>,
-    /// Chunks asked last: corners of near tetrahedra lie in one or two.
-    last: [Window; 2],
+    /// The last two chunks used: corners of close tetrahedra are in one or two.
+    last: [ResidentChunk; 2],
     bytes: usize,
     bytes_max: usize,
     loads: u64,
@@ -90,9 +106,9 @@ impl VertexCache {
             resident: Vec::new(),
             vacant: Vec::new(),
             order: LruCache::unbounded(),
-            loader: Loader::of(form, (subdomain, generation))?,
+            loader: Loader::new(form, (subdomain, generation))?,
             scratch: Vec::new(),
-            last: [Window::EMPTY; 2],
+            last: [ResidentChunk::EMPTY; 2],
             bytes: 0,
             bytes_max,
             loads: 0,
@@ -115,7 +131,7 @@ impl VertexCache {
     #[inline(always)]
     pub fn corner(&mut self, file: &mut StoreFile, v: u32) -> Result<Corner, SealedError> {
         let [a, b] = &self.last;
-        let within = |w: &Window| w.first <= v && v < w.end;
+        let within = |w: &ResidentChunk| w.first <= v && v < w.end;
         let w = if within(a) {
             *a
         } else if within(b) {
@@ -129,9 +145,9 @@ impl VertexCache {
         }
     }
 
-    /// The chunk of `v`, resident, in place of the one of the last two that was asked first.
+    /// Makes the chunk of `v` resident and the latest of the last two.
     #[inline(never)]
-    fn turn_to(&mut self, file: &mut StoreFile, v: u32) -> Result<Window, SealedError> {
+    fn turn_to(&mut self, file: &mut StoreFile, v: u32) -> Result<ResidentChunk, SealedError> {
         if v >= self.n_vertices {
             return Err(self.no_such_vertex(file, v));
         }
@@ -140,7 +156,7 @@ impl VertexCache {
             self.load(file, chunk)?;
         }
         self.referenced[chunk] = true;
-        let window = Window {
+        let window = ResidentChunk {
             chunk: chunk as u32,
             first: self.firsts[chunk],
             end: self.firsts.get(chunk + 1).copied().unwrap_or(self.n_vertices),
@@ -166,11 +182,8 @@ impl VertexCache {
 
     #[cold]
     fn no_such_vertex(&self, file: &StoreFile, v: u32) -> SealedError {
-        SealedError::Content {
-            path: file.path().to_owned(),
-            subdomain: self.subdomain,
-            what: format!("vertex {v} is named, there are {}", self.n_vertices),
-        }
+        let what = format!("vertex {v} is named, there are {}", self.n_vertices);
+        SealedError::content(file.path(), self.subdomain, what)
     }
 
     #[cold]
@@ -184,14 +197,9 @@ impl VertexCache {
         let first = self.loader.load(file, address, &mut self.scratch)?;
         self.loads += 1;
         if first != self.firsts[chunk] {
-            return Err(SealedError::Content {
-                path: file.path().to_owned(),
-                subdomain: self.subdomain,
-                what: format!(
-                    "vertex chunk {chunk} starts at {first}, expected {}",
-                    self.firsts[chunk]
-                ),
-            });
+            let expected = self.firsts[chunk];
+            let what = format!("vertex chunk {chunk} starts at {first}, expected {expected}");
+            return Err(SealedError::content(file.path(), self.subdomain, what));
         }
         let needed = self.scratch.len() * size_of::<Corner>();
         while self.bytes + needed > self.bytes_max && self.order.len() >= CHUNKS_LEAST {
@@ -224,10 +232,10 @@ impl VertexCache {
                 self.order.put(chunk, ());
                 continue;
             }
-            // Whoever asks for it next has it read again.
+            // The chunk is read again when it is next needed.
             for window in &mut self.last {
                 if window.chunk == chunk {
-                    *window = Window::EMPTY;
+                    *window = ResidentChunk::EMPTY;
                 }
             }
             let place = std::mem::replace(&mut self.places[chunk as usize], NOT_RESIDENT);

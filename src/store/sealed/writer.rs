@@ -1,4 +1,4 @@
-//! Makes the file of a finished sub-domain: vertices, then tetrahedra, then faces, each a stream.
+//! Writes the file of a finished sub-domain: vertices, then tetrahedra, then faces, each a stream.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
 use super::SealedError;
 use super::batch::Batch;
 use super::form::{Cut, Cutter};
-use super::totals::{RegionTotals, Totals, array, count_open};
+use super::totals::{RegionTotals, SubdomainTotals, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{DiskPath, StoreFile, join};
@@ -26,18 +26,18 @@ pub struct InterfaceSide {
     pub cut: u32,
     /// The sub-domain on the other side.
     pub other: u32,
-    /// How many faces there are.
+    /// Number of faces.
     pub faces: u64,
-    /// Of the faces, seen from this side.
+    /// Digest of the faces seen from this side.
     pub digest: Digest,
 }
 
-/// What was sealed.
+/// The result of sealing a sub-domain.
 #[derive(Clone, Debug)]
 pub struct Sealed {
     /// The row to put into the catalog.
     pub row: SubdomainRow,
-    /// Of each region with tetrahedra here, by number.
+    /// Sums of each region with tetrahedra in the sub-domain, by number.
     pub regions: BTreeMap<u32, RegionTotals>,
     /// By cut, then by the other sub-domain.
     pub interfaces: Vec<InterfaceSide>,
@@ -63,7 +63,7 @@ pub struct SealedWriter {
     vertex_chunks: Vec<VertexSummary>,
     cache: Option<VertexCache>,
     tets: Cutter<SealedTet>,
-    /// To be summed up and stored.
+    /// Tetrahedra that are packed and not yet summed up and stored.
     packed: Vec<Cut<SealedTet>>,
     tet_chunks: Vec<TetSummary>,
     facets: Cutter<SealedFacet>,
@@ -71,7 +71,7 @@ pub struct SealedWriter {
     faces: Cutter<InterfaceFace>,
     face_chunks: Vec<RangeSummary<true>>,
     pairs: FacePairs,
-    totals: Totals,
+    totals: SubdomainTotals,
     interfaces: BTreeMap<(u32, u32), (u64, Digest)>,
 }
 
@@ -88,7 +88,7 @@ impl SealedWriter {
         Self::create_as(Form::Packed, path, subdomain, generation, memory_bytes)
     }
 
-    /// The same in either form. Errors: as [`SealedWriter::create`].
+    /// Starts the file in either form. Errors: as [`SealedWriter::create`].
     pub fn create_as(
         form: Form,
         path: impl Into<DiskPath>,
@@ -107,7 +107,7 @@ impl SealedWriter {
             subdomain,
             generation,
             memory_bytes,
-            batch: Batch::of(memory_bytes),
+            batch: Batch::new(memory_bytes),
             form,
             vertices: Cutter::new(form, rank, generation).map_err(io)?,
             vertex_chunks: Vec::new(),
@@ -120,12 +120,12 @@ impl SealedWriter {
             faces: Cutter::new(form, rank, generation).map_err(io)?,
             face_chunks: Vec::new(),
             pairs: FacePairs::new(SealedTet::COUNT_MAX),
-            totals: Totals::default(),
+            totals: SubdomainTotals::default(),
             interfaces: BTreeMap::new(),
         })
     }
 
-    /// The next vertex; its number is its place in the stream.
+    /// Adds a vertex, whose number is its place in the stream.
     ///
     /// Errors: the disk.
     pub fn push_vertex(&mut self, vertex: SealedVertex) -> Result<(), SealedError> {
@@ -157,7 +157,7 @@ impl SealedWriter {
         self.put(chunk.values)
     }
 
-    /// Ends the stream of vertices: from now on they can be read.
+    /// Ends the stream of vertices, so that they can be read.
     fn end_vertices(&mut self) -> Result<(), SealedError> {
         if self.cache.is_some() {
             return Ok(());
@@ -178,7 +178,7 @@ impl SealedWriter {
         Ok(())
     }
 
-    /// All tetrahedra, by nodes and region: positive, in the order of their numbers.
+    /// Adds all tetrahedra by nodes and region: positive, in the order of their numbers.
     ///
     /// Errors: as [`SealedWriter::push_tets`].
     pub fn push_all_tets(
@@ -194,10 +194,10 @@ impl SealedWriter {
         Ok(())
     }
 
-    /// Some thousands of the next tetrahedra, rotated ([`SealedTet::rotated`]), each with what a working page tells of it; chunks do not. The number of
+    /// Adds some thousands of tetrahedra, rotated ([`SealedTet::rotated`]), each with the data that only a working page keeps. The number of
     /// each is its place in the stream.
     ///
-    /// They are taken and packed while another thread sums up those before. Smallest when they come sorted by their nodes.
+    /// One thread takes and packs them while another sums up those before. The file is smallest when they come sorted by their nodes.
     /// Errors: those of `tets`; the disk; a vertex that was not pushed.
     pub fn push_tets<E: From<SealedError> + Send>(
         &mut self,
@@ -247,24 +247,19 @@ impl SealedWriter {
         Ok(())
     }
 
-    /// The next facet.
+    /// Adds a facet.
     ///
     /// Errors: the disk.
     pub fn push_facet(&mut self, facet: SealedFacet) -> Result<(), SealedError> {
         let cut = self.facets.push(facet, SealedFacet::to_working);
         if let Some(chunk) = cut.map_err(self.io())? {
-            self.put_facets(chunk)?;
+            self.facet_chunks.push(summary(&chunk));
+            self.put(chunk.values)?;
         }
         Ok(())
     }
 
-    fn put_facets(&mut self, chunk: Cut<SealedFacet>) -> Result<(), SealedError> {
-        self.facet_chunks
-            .push(RangeSummary { first: chunk.first, count: chunk.records.len() as u32 });
-        self.put(chunk.values)
-    }
-
-    /// The next interface face.
+    /// Adds an interface face.
     ///
     /// Errors: the disk; a vertex that was not pushed.
     pub fn push_interface_face(&mut self, face: InterfaceFace) -> Result<(), SealedError> {
@@ -277,15 +272,10 @@ impl SealedWriter {
         let rank = self.subdomain.rank();
         let cut = self.faces.push(face, |face| face.to_working(rank));
         if let Some(chunk) = cut.map_err(self.io())? {
-            self.put_faces(chunk)?;
+            self.face_chunks.push(summary(&chunk));
+            self.put(chunk.values)?;
         }
         Ok(())
-    }
-
-    fn put_faces(&mut self, chunk: Cut<InterfaceFace>) -> Result<(), SealedError> {
-        self.face_chunks
-            .push(RangeSummary { first: chunk.first, count: chunk.records.len() as u32 });
-        self.put(chunk.values)
     }
 
     fn put_summaries<R: ChunkRecord>(&mut self, summaries: &[R]) -> Result<u32, SealedError> {
@@ -304,7 +294,7 @@ impl SealedWriter {
         Ok(packer.chunks())
     }
 
-    /// Writes what is left, shrinks the file and closes it.
+    /// Writes the remaining records, shrinks the file and closes it.
     ///
     /// Errors: the disk.
     pub fn finish(mut self) -> Result<Sealed, SealedError> {
@@ -317,10 +307,12 @@ impl SealedWriter {
         let mut none = std::iter::empty();
         self.push_tets::<SealedError>(&mut none)?;
         while let Some(chunk) = self.facets.cut().map_err(&io)? {
-            self.put_facets(chunk)?;
+            self.facet_chunks.push(summary(&chunk));
+            self.put(chunk.values)?;
         }
         while let Some(chunk) = self.faces.cut().map_err(&io)? {
-            self.put_faces(chunk)?;
+            self.face_chunks.push(summary(&chunk));
+            self.put(chunk.values)?;
         }
         let tets = std::mem::take(&mut self.tet_chunks);
         let vertices = std::mem::take(&mut self.vertex_chunks);
@@ -365,6 +357,10 @@ impl SealedWriter {
         };
         Ok(Sealed { row, regions: totals.regions, interfaces })
     }
+}
+
+fn summary<R, const IS_FACE: bool>(chunk: &Cut<R>) -> RangeSummary<IS_FACE> {
+    RangeSummary { first: chunk.first, count: chunk.records.len() as u32 }
 }
 
 /// The kinds of chunks in the order of [`SubdomainRow::chunks`].

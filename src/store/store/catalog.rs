@@ -1,4 +1,4 @@
-//! The directory of a store: created, opened, its files named and, when nobody lists them, removed.
+//! The directory of a store: creating and opening it, the names of its files, and removing files that are not listed.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -26,25 +26,25 @@ const MAGIC: &[u8; 8] = b"TETDBCAT";
 /// The catalog is small: its redb cache need not be large.
 const CACHE_BYTES: usize = 2 << 20;
 const CATALOG: &str = "catalog.redb";
-/// The catalog until its first commit: a catalog that can be seen has its job.
+/// The catalog before its first commit, so that a visible catalog has its job.
 const CATALOG_NEW: &str = "catalog.redb-new";
-/// The catalog of a finished store as it is after the next commit, until it takes the place of the one before.
+/// The next catalog of a finished store, before it replaces the current one.
 const CATALOG_NEXT: &str = "catalog.redb-next";
 /// Folder of sorted runs; everything in it is scratch.
 const SCRATCH: &str = "scratch";
-/// Folder of tasks that others do; nothing in it counts once the store is finished.
+/// Folder of tasks for other processes; it is not needed once the store is finished.
 const WORK: &str = "work";
 
 /// The catalog of a store, open for reading or for writing.
 ///
-/// At most one process writes at a time, and has [`WriterLock`] from before its first byte to after its last. Changes happen in
-/// [`Catalog::commit`] only. The catalog of an unfinished store is changed in place, and nobody can read it meanwhile. That of a finished
-/// store never is: a commit writes another file, which takes its name. A reader has the file that had the name when it came, so that it
-/// sees one state of the store however long it reads, and neither waits for the other.
+/// At most one process writes at a time; it holds the [`WriterLock`] from before its first byte to after its last. Only [`Catalog::commit`]
+/// changes the catalog. That of an unfinished store is changed in place, and cannot be read meanwhile. For a finished store, a commit writes a
+/// new file and gives it the catalog's name. A reader keeps the file that it opened, so it sees one state of the store, and readers and writer
+/// never wait for each other.
 pub struct Catalog {
     dir: DiskPath,
     file: StoreFile,
-    /// Which file `file` is; another one has its name once the store has been changed.
+    /// Identity of `file`; another file has its name once the store has been changed.
     id: Option<FileId>,
     /// `None`: open for reading only.
     lock: Option<Arc<WriterLock>>,
@@ -53,11 +53,11 @@ pub struct Catalog {
     journal_rows: u32,
 }
 
-/// The measure of the coarse mesh that says how many triangles the input has.
+/// Name of the coarse mesh's measure with the number of input triangles.
 pub const INPUT_TRIANGLES: &str = "input_triangles";
 
 impl Catalog {
-    /// Makes a new store: the directory, the catalog, the job.
+    /// Creates a store: the directory, the catalog, the job.
     ///
     /// An empty directory is taken over. Errors: [`StoreError::Finished`], [`StoreError::Unfinished`],
     /// [`StoreError::NotOurs`] or [`StoreError::Busy`] say what is already there.
@@ -73,7 +73,7 @@ impl Catalog {
     ) -> Result<Self, StoreError> {
         let dir = dir.into();
         match refuse_existing(&dir) {
-            // Whether somebody is at it, the lock says.
+            // The lock decides whether another process writes.
             Ok(()) | Err(StoreError::Unfinished { .. }) => {}
             Err(other) => return Err(other),
         }
@@ -105,7 +105,7 @@ impl Catalog {
         Ok(catalog)
     }
 
-    /// Whether `dir` is a directory where a store can be created: empty, or left by a run that was killed before its first commit.
+    /// Returns whether a store can be created in `dir`: it is empty, or left by a run that was killed before its first commit.
     pub fn is_vacant(dir: impl Into<DiskPath>) -> bool {
         let names = dir.into().list();
         names.is_ok_and(|names| holds_nothing(&names))
@@ -129,7 +129,7 @@ impl Catalog {
         Self::open_locked(dir, lock)
     }
 
-    /// The same for one who has the lock of the store. Errors: as [`Catalog::open`].
+    /// Opens a store for writing with its lock. Errors: as [`Catalog::open`].
     pub fn open_locked(
         dir: impl Into<DiskPath>,
         lock: Arc<WriterLock>,
@@ -150,7 +150,7 @@ impl Catalog {
         self.lock.clone()
     }
 
-    /// The same state of the store for another reader.
+    /// Returns another reader of the same state of the store.
     pub fn share(&self) -> Self {
         Self {
             dir: self.dir.clone(),
@@ -162,12 +162,12 @@ impl Catalog {
         }
     }
 
-    /// Whether the store is as it was when this was opened.
+    /// Returns whether the store is unchanged since it was opened.
     pub fn is_current(&self) -> bool {
         self.dir.join(CATALOG).id() == self.id
     }
 
-    /// Whether there is a catalog in a folder.
+    /// Returns whether a folder has a catalog.
     pub fn is_at(dir: impl Into<DiskPath>) -> bool {
         dir.into().join(CATALOG).is_file()
     }
@@ -195,7 +195,7 @@ impl Catalog {
         let (file, id) = loop {
             let id = path.id();
             let file = StoreFile::open_repaired(&path, CACHE_BYTES, in_place)?;
-            // Another may have taken its name between the two looks.
+            // The name may have changed to another file between the two looks.
             if path.id() == id {
                 break (file, id);
             }
@@ -266,12 +266,12 @@ impl Catalog {
         named(COARSE, file)
     }
 
-    /// Where the file of a sub-domain in a generation is, whether it exists or not.
+    /// Path of the file of a sub-domain in a generation, which may not exist.
     pub fn file_path(&self, subdomain: u32, generation: u32) -> DiskPath {
         self.dir.join(Self::file_name(subdomain, generation))
     }
 
-    /// Where the file of a coarse snapshot in a generation is, whether it exists or not.
+    /// Path of the file of a coarse snapshot in a generation, which may not exist.
     pub fn coarse_path(&self, subdomain: u32, generation: u32) -> DiskPath {
         self.dir.join(Self::coarse_name(subdomain, generation))
     }
@@ -290,7 +290,7 @@ impl Catalog {
         self.dir.join(WORK)
     }
 
-    /// The same of the store at a path that is not opened.
+    /// The folder of tasks of a store that is not opened.
     pub fn work_dir_at(dir: impl Into<DiskPath>) -> DiskPath {
         dir.into().join(WORK)
     }
@@ -369,16 +369,14 @@ impl Catalog {
         Ok(())
     }
 
-    /// How far the store is.
+    /// State of the store.
     pub fn state(&mut self) -> Result<StoreState, StoreError> {
-        let state = self.row(RowKind::State.key(0, 0))?;
-        state.ok_or_else(|| self.missing(RowKind::State.key(0, 0)))
+        self.needed(RowKind::State)
     }
 
-    /// What was asked for.
+    /// The job: source and options of the mesh.
     pub fn job(&mut self) -> Result<Job, StoreError> {
-        let job = self.row(RowKind::Job.key(0, 0))?;
-        job.ok_or_else(|| self.missing(RowKind::Job.key(0, 0)))
+        self.needed(RowKind::Job)
     }
 
     /// Names of the labels; a facet's label is a position here.
@@ -391,7 +389,7 @@ impl Catalog {
         Ok(self.row(RowKind::Regions.key(0, 0))?.unwrap_or_default())
     }
 
-    /// What regions are called: of region 1, 2, …, empty for one without a name; shorter where the last have none.
+    /// Names of regions 1, 2, …, empty for a region without a name; shorter where the last have none.
     pub fn region_names(&mut self) -> Result<Vec<String>, StoreError> {
         let names = self.row(RowKind::RegionNames.key(0, 0))?;
         Ok(names.unwrap_or_default())
@@ -426,9 +424,9 @@ impl Catalog {
         Ok(rows)
     }
 
-    /// Refuses a row that no sub-domain can have, before anybody computes with it.
+    /// Refuses a row that no sub-domain can have, before it is used.
     fn check_row(&self, row: &SubdomainRow) -> Result<(), StoreError> {
-        let is_finished = Form::of(row.state).is_some() && row.vertices > 0;
+        let is_finished = Form::from_state(row.state).is_some() && row.vertices > 0;
         let is_sound = is_box(&row.bounds) && !row.volume.is_nan() && !row.quality.worst.is_nan();
         let counts = [row.tets, row.vertices, row.facets, row.interface_faces];
         let reason = match !is_finished || is_sound {
@@ -436,15 +434,15 @@ impl Catalog {
             true if !are_counts(counts) => "counts more than a sub-domain can have",
             true => return Ok(()),
         };
-        Err(self.damaged_row(RowKind::Subdomain.key(0, row.rank), reason.to_owned()))
+        Err(self.damaged_row(RowKind::Subdomain.key(0, row.rank), reason))
     }
 
-    /// The same for a coarse snapshot.
+    /// Refuses a row that no coarse snapshot can have.
     fn check_coarse(&self, row: &CoarseRow) -> Result<(), StoreError> {
         match are_counts([row.tets, row.vertices, row.facets, row.interface_faces]) {
             true => Ok(()),
             false => {
-                let reason = "counts more than a sub-domain can have".to_owned();
+                let reason = "counts more than a sub-domain can have";
                 Err(self.damaged_row(RowKind::Coarse.key(0, row.rank), reason))
             }
         }
@@ -475,7 +473,7 @@ impl Catalog {
         self.open_row(row, memory_bytes)
     }
 
-    /// The same of a row at hand, which may be that of a [`StageRow`]. Errors: unfinished; damage.
+    /// Opens the sub-domain of a row, which may be that of a [`StageRow`]. Errors: unfinished; damage.
     pub fn open_row(
         &self,
         row: SubdomainRow,
@@ -491,10 +489,10 @@ impl Catalog {
         })
     }
 
-    /// What was opened of a file that this catalog lists.
+    /// Checks that an opened file is still the one that this catalog lists.
     ///
-    /// Names of files that are no longer listed may be given again, also by a whole new store at the same path. So when the store has been
-    /// changed, a file is only ours if the new catalog has the same row of it. Errors: [`StoreError::Changed`]; that of `opened`.
+    /// Names of unlisted files may be used again, also by a new store at the same path. So when the store has been
+    /// changed, a file is valid only if the new catalog has the same row for it. Errors: [`StoreError::Changed`]; that of `opened`.
     fn of_one_state<T>(
         &self,
         opened: Result<T, SealedError>,
@@ -532,7 +530,7 @@ impl Catalog {
     pub fn digest(&mut self) -> Result<[Digest; 2], StoreError> {
         let mut both = [Digest::default(); 2];
         for row in self.subdomains()? {
-            if Form::of(row.state).is_none() {
+            if Form::from_state(row.state).is_none() {
                 return Err(StoreError::Sealed(SealedError::NotSealed {
                     path: self.dir().to_owned(),
                     subdomain: row.rank,
@@ -544,7 +542,7 @@ impl Catalog {
         Ok(both)
     }
 
-    /// What the sub-domains of the last change were before it, by rank.
+    /// Rows of the sub-domains before the last change, by rank.
     pub fn previous(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
         let rows: Vec<SubdomainRow> = self.rows(RowKind::Previous)?;
         rows.iter().try_for_each(|row| self.check_row(row))?;
@@ -576,12 +574,12 @@ impl Catalog {
         Ok(rows.into_iter().flatten().collect())
     }
 
-    /// Who neighbors whom, by sub-domain.
+    /// Neighbors of each sub-domain, by rank.
     pub fn topology(&mut self) -> Result<Vec<TopologyRow>, StoreError> {
         self.rows(RowKind::Topology)
     }
 
-    /// Meshes that were kept to be looked at, the coarse ones first, by cut.
+    /// Kept stages of meshes, the coarse ones first, by cut.
     pub fn stages(&mut self) -> Result<Vec<StageRow>, StoreError> {
         let stages: Vec<StageRow> = self.rows(RowKind::Stage)?;
         stages.iter().try_for_each(|stage| self.check_row(&stage.row))?;
@@ -593,7 +591,7 @@ impl Catalog {
         self.rows(RowKind::Journal)
     }
 
-    /// Bytes kept under a number with [`Step::set_blob`], or `None`.
+    /// Bytes saved with [`Step::set_blob`], or `None`.
     pub fn blob(&mut self, number: u32) -> Result<Option<Vec<u8>>, StoreError> {
         let mut whole = None::<Vec<u8>>;
         for piece in 0.. {
@@ -610,17 +608,24 @@ impl Catalog {
         Ok(self.dir.join(CATALOG).bytes()?)
     }
 
-    /// Shrinks the catalog to what it holds, and closes it.
+    /// Shrinks the catalog and closes it.
     pub fn close(self) -> Result<(), StoreError> {
         Ok(self.file.compact()?)
     }
 
-    fn missing(&self, key: u64) -> StoreError {
-        self.damaged_row(key, "is missing".to_owned())
+    fn damaged_row(&self, key: u64, reason: impl Into<String>) -> StoreError {
+        StoreError::Row { path: self.file.path().to_owned(), key, reason: reason.into() }
     }
 
-    fn damaged_row(&self, key: u64, reason: String) -> StoreError {
-        StoreError::Row { path: self.file.path().to_owned(), key, reason }
+    /// The only row of a kind. Errors: damage, or there is none.
+    fn needed<T>(&mut self, kind: RowKind) -> Result<T, StoreError>
+    where
+        T: Archive,
+        T::Archived: for<'a> CheckBytes<HighValidator<'a, rancor::Error>>
+            + Deserialize<T, HighDeserializer<rancor::Error>>,
+    {
+        let key = kind.key(0, 0);
+        self.row(key)?.ok_or_else(|| self.damaged_row(key, "is missing"))
     }
 
     fn bytes(&mut self, key: u64) -> Result<Option<Vec<u8>>, StoreError> {
@@ -661,7 +666,7 @@ impl Catalog {
     }
 }
 
-/// Says what is in the way of a new store, if anything is.
+/// Refuses a folder where no store can be created.
 fn refuse_existing(dir: &DiskPath) -> Result<(), StoreError> {
     let path = dir.path().to_owned();
     if !dir.exists() {
@@ -681,7 +686,7 @@ fn refuse_existing(dir: &DiskPath) -> Result<(), StoreError> {
     }
 }
 
-/// Whether a folder with these names is one where a store can be created.
+/// Returns whether a store can be created in a folder with these names.
 fn holds_nothing(names: &[String]) -> bool {
     let is_left_over = |name: &String| [CATALOG_NEW, LOCK].contains(&&**name);
     names.iter().all(is_left_over)
@@ -702,7 +707,7 @@ fn parsed(kind: &str, name: &str) -> Option<FileRow> {
     (named(kind, file) == name).then_some(file)
 }
 
-/// Whether records can be counted so: their numbers have 32 bits.
+/// Returns whether numbers of 32 bits can count the records.
 fn are_counts(counts: [u64; 4]) -> bool {
     counts.iter().all(|&n| n <= u64::from(u32::MAX))
 }

@@ -13,10 +13,10 @@ pub enum StoreError {
     Busy {
         /// The file or folder.
         path: PathBuf,
-        /// Who, in words.
+        /// The process, in words.
         writer: String,
     },
-    /// Another process has changed the store since it was opened, and what was asked for is no longer there.
+    /// Another process has changed the store since it was opened, and the requested file is no longer there.
     #[error("{path} was changed by another process while it was read")]
     Changed {
         /// The folder.
@@ -33,7 +33,7 @@ pub enum StoreError {
     NotOurs {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         reason: &'static str,
     },
     /// A finished store is already there.
@@ -85,7 +85,7 @@ pub enum StoreError {
         path: PathBuf,
         /// Key of the row.
         key: u64,
-        /// What is wrong with it.
+        /// The fault.
         reason: String,
     },
     /// The file of a sub-domain.
@@ -97,7 +97,7 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// Whether what is on disk is not what was written.
+    /// Returns whether the store was changed after it was written.
     pub fn is_damage(&self) -> bool {
         match self {
             Self::Row { .. } => true,

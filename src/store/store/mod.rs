@@ -1,8 +1,7 @@
-//! The catalog of a store: the job, the steps, sub-domain rows; one commit a step.
+//! The catalog of a store: the job, the steps, sub-domain rows; one commit for each step.
 //!
-//! A store is a directory. Its catalog names the files that count; a step of the mesher writes new
-//! files and then flips the catalog in one commit, so that a store is at any moment as one of its
-//! steps left it.
+//! A store is a directory. Its catalog lists the files that count. A step of the mesher writes new files and then changes the catalog in one
+//! commit, so that a store is always in the state after some step.
 
 #![warn(missing_docs)]
 

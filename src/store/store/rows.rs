@@ -1,4 +1,4 @@
-//! Rows as bytes: a checksum that knows the key, then the archived record.
+//! Rows as bytes: a checksum seeded by the key, then the archived record.
 
 use rkyv::api::high::{HighDeserializer, HighSerializer, HighValidator};
 use rkyv::bytecheck::CheckBytes;
@@ -8,7 +8,7 @@ use rkyv::util::AlignedVec;
 use rkyv::{Archive, Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-/// What a row of the catalog holds.
+/// Kinds of rows of the catalog.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum RowKind {

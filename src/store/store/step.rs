@@ -1,4 +1,4 @@
-//! What one step changes in the catalog.
+//! Changes of the catalog in one step.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,7 +16,7 @@ pub struct Step {
     pub(super) changes: BTreeMap<u64, Option<Vec<u8>>>,
     pub(super) listed: BTreeSet<FileRow>,
     pub(super) unlisted: BTreeSet<FileRow>,
-    /// The same for coarse snapshots.
+    /// Coarse snapshots to list.
     pub(super) coarse_listed: BTreeSet<FileRow>,
     pub(super) journal_rows: u32,
 }
@@ -54,52 +54,52 @@ impl Step {
         self.changes.insert(key, Some(rows::encode(key, row)));
     }
 
-    /// How far the store is after this step.
+    /// Sets the state of the store after this step.
     pub fn set_state(&mut self, state: StoreState) {
         self.put(RowKind::State.key(0, 0), &state);
     }
 
-    /// What was asked for.
+    /// Sets the job.
     pub fn set_job(&mut self, job: &Job) {
         self.put(RowKind::Job.key(0, 0), job);
     }
 
-    /// Names of the labels.
+    /// Sets the names of the labels.
     pub fn set_labels(&mut self, labels: &Vec<String>) {
         self.put(RowKind::Labels.key(0, 0), labels);
     }
 
-    /// The regions.
+    /// Sets the regions.
     pub fn set_regions(&mut self, regions: &Vec<RegionRow>) {
         self.put(RowKind::Regions.key(0, 0), regions);
     }
 
-    /// What regions are called, from region 1 on.
+    /// Sets the names of regions from region 1 on.
     pub fn set_region_names(&mut self, names: &Vec<String>) {
         self.put(RowKind::RegionNames.key(0, 0), names);
     }
 
-    /// Edges and points, where there are any.
+    /// Sets the embedded edges and points.
     pub fn set_wires(&mut self, wires: &WiresRow) {
         self.put(RowKind::Wires.key(0, 0), wires);
     }
 
-    /// A sub-domain, new or changed.
+    /// Sets the row of a sub-domain.
     pub fn set_subdomain(&mut self, row: &SubdomainRow) {
         self.put(RowKind::Subdomain.key(0, row.rank), row);
     }
 
-    /// What a sub-domain was before its last change; its file must stay listed.
+    /// Sets a sub-domain's row before its last change; its file must stay listed.
     pub fn set_previous(&mut self, row: &SubdomainRow) {
         self.put(RowKind::Previous.key(0, row.rank), row);
     }
 
-    /// Forgets what a sub-domain was before.
+    /// Removes a sub-domain's row before its last change.
     pub fn remove_previous(&mut self, rank: u32) {
         self.changes.insert(RowKind::Previous.key(0, rank), None);
     }
 
-    /// A file counts from now on; it is synced before the commit.
+    /// Lists a file; it is synced before the commit.
     pub fn list_file(&mut self, subdomain: u32, generation: u32) {
         let file = FileRow { subdomain, generation };
         self.put(RowKind::File.key(subdomain, generation), &file);
@@ -107,7 +107,7 @@ impl Step {
         self.listed.insert(file);
     }
 
-    /// A file no longer counts; it is removed after the commit.
+    /// Unlists a file; it is removed after the commit.
     pub fn unlist_file(&mut self, subdomain: u32, generation: u32) {
         let file = FileRow { subdomain, generation };
         self.changes.insert(RowKind::File.key(subdomain, generation), None);
@@ -115,23 +115,23 @@ impl Step {
         self.unlisted.insert(file);
     }
 
-    /// A coarse snapshot counts from now on; its file is synced before the commit.
+    /// Lists a coarse snapshot; its file is synced before the commit.
     pub fn list_coarse(&mut self, row: &CoarseRow) {
         self.put(RowKind::Coarse.key(0, row.rank), row);
         self.coarse_listed.insert(FileRow { subdomain: row.rank, generation: row.generation });
     }
 
-    /// All interfaces of one cut.
+    /// Sets all interfaces of one cut.
     pub fn set_interfaces(&mut self, cut: u32, interfaces: &Vec<InterfaceRow>) {
         self.put(RowKind::Interface.key(0, cut), interfaces);
     }
 
-    /// The neighbors of one sub-domain.
+    /// Sets the neighbors of one sub-domain.
     pub fn set_topology(&mut self, row: &TopologyRow) {
         self.put(RowKind::Topology.key(0, row.subdomain), row);
     }
 
-    /// A mesh kept to be looked at.
+    /// Sets the stage of a mesh that is kept.
     pub fn set_stage(&mut self, stage: &StageRow) {
         self.put(RowKind::Stage.key(stage.stage as u32, stage.cut), stage);
     }
@@ -142,7 +142,7 @@ impl Step {
         self.journal_rows += 1;
     }
 
-    /// Keeps bytes under a number below 2^24, such as the size field.
+    /// Saves bytes under a number below 2^24, such as the size field.
     ///
     /// Replaces a blob of any length: the piece after its last is removed, and reading stops there.
     pub fn set_blob(&mut self, number: u32, bytes: &[u8]) {
@@ -158,7 +158,7 @@ impl Step {
         self.changes.insert(RowKind::Blob.key(number, pieces), None);
     }
 
-    /// Forgets a blob of so many bytes.
+    /// Removes a blob of so many bytes.
     pub fn remove_blob(&mut self, number: u32, bytes: usize) {
         for piece in 0..=bytes.div_ceil(BLOB_PIECE) as u32 {
             self.changes.insert(RowKind::Blob.key(number, piece), None);

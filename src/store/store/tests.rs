@@ -124,7 +124,7 @@ fn a_store_of_two_subdomains_reads_back() -> Outcome {
         let face = part.interfaces().next().ok_or("an interface face")??;
         assert_eq!((face.cut, face.other), (1, 1 - rank));
         let corners = part.corners(tets[0].1.nodes)?;
-        volume += Shape::of(corners.map(|c| c.point)).volume;
+        volume += Shape::new(corners.map(|c| c.point)).volume;
         assert!(part.corner(4).is_err());
         assert!(part.row().bytes < 200_000, "{}", part.row().bytes);
     }

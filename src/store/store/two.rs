@@ -13,7 +13,7 @@ pub fn two_subdomains(path: &Path) -> Result<(), StoreError> {
     let mut catalog = Catalog::create(path, &Job::default())?;
     let points =
         [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
-    // Of each sub-domain: vertices, the tetrahedron, the face shared with the other one.
+    // For each sub-domain: vertices, the tetrahedron, the face shared with the other one.
     let parts = [([0, 1, 2, 3], [0u32, 1, 2, 3], 0usize), ([4, 1, 2, 3], [0, 1, 3, 2], 0)];
     let mut sealed = Vec::new();
     for (rank, (vertices, nodes, shared)) in (0u32..).zip(parts) {

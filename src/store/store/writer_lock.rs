@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::StoreError;
 use tetdb_base::storage::{DiskPath, FileLock, Refused, StorageError};
 
-/// Stands for the right; see [`FileLock`].
+/// File of the right to change a store; see [`FileLock`].
 pub(super) const LOCK: &str = "writer.lock";
 
 /// The right to change a store, which one process at a time has; it ends when the last that shares it is dropped.
@@ -30,13 +30,13 @@ impl WriterLock {
         }
     }
 
-    /// Whether the store is on a file system that knows no locks: then the file [`WriterLock`] left there decides, and one that was left
+    /// Returns whether the file system has no locks. Then the file that [`WriterLock`] leaves there decides, and a file left
     /// by a process of another host has to be removed by hand.
     pub fn is_by_name(&self) -> bool {
         self.file.is_by_name()
     }
 
-    /// The store has another name now.
+    /// Moves the lock to the store's new directory.
     pub fn moved_to(&self, dir: &Path) {
         self.file.moved_to(&dir.join(LOCK));
     }

@@ -131,7 +131,7 @@ impl Part {
                 for tet in part.tet_chunk(chunk as u32)?.records {
                     let corners = part.corners(tet.nodes)?.map(|corner| corner.point);
                     if let Some(row) = rows.next() {
-                        *row = Shape::of(corners).quality;
+                        *row = Shape::new(corners).quality;
                     }
                 }
             }
@@ -284,7 +284,7 @@ pub fn qualities<'py>(
         let corner = |v: i32| tetdb::data::DVec3::from_slice(&points[3 * v as usize..]);
         py.detach(|| {
             for (tet, quality) in tets.iter().zip(out) {
-                *quality = Shape::of(tet.map(corner)).quality;
+                *quality = Shape::new(tet.map(corner)).quality;
             }
         });
     }

@@ -258,7 +258,7 @@ impl<'a> RemeshRun<'a> {
             sealed: self.catalog.file_path(rank, generation),
             generation,
             // As it was.
-            form: Form::of(row.state).unwrap_or_default(),
+            form: Form::from_state(row.state).unwrap_or_default(),
             field,
             kept: None,
             scratch,

@@ -92,7 +92,7 @@ mod tests {
         let budget = Budget::new(256 << 20);
         mesh(&mut catalog, &surface, &options, &budget, &|_| {})?;
         for row in catalog.subdomains()? {
-            assert_eq!(Form::of(row.state), Some(Form::Pages));
+            assert_eq!(Form::from_state(row.state), Some(Form::Pages));
             let path = catalog.file_path(row.rank, row.generation);
             let backing = Backing {
                 subdomain: row.rank,

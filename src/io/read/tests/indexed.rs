@@ -52,7 +52,7 @@ fn off_good_and_bad() {
         ("not-a-number", Spot::Line(4))
     );
     assert_eq!(bad("4 0 0", ""), ("count-mismatch", Spot::Line(2)));
-    assert_eq!(refuse(Format::Off, "OFF\n0 0 0\n"), ("empty-surface", Spot::Totals));
+    assert_eq!(refuse(Format::Off, "OFF\n0 0 0\n"), ("empty-surface", Spot::File));
     assert_eq!(refuse(Format::Off, "hello"), ("unexpected-text", Spot::Line(1)));
 }
 
@@ -92,5 +92,5 @@ fn obj_good_and_bad() {
     assert_eq!(bad("f 2//7 3//7", "f 2//7"), ("unexpected-text", Spot::Line(5)));
     assert_eq!(bad("v 1 0", "v nan 0"), ("not-a-number", Spot::Line(2)));
     assert_eq!(bad("v 1 0 0", "v 1 0"), ("unexpected-text", Spot::Line(2)));
-    assert_eq!(refuse(Format::Obj, vertices), ("empty-surface", Spot::Totals));
+    assert_eq!(refuse(Format::Obj, vertices), ("empty-surface", Spot::File));
 }

@@ -72,8 +72,8 @@ fn bad_stl() {
     assert_eq!(refuse(Format::Stl, &whole[..80]).0, "truncated-file");
     let mut none = whole[..84].to_vec();
     none[80] = 0;
-    assert_eq!(refuse(Format::Stl, &none), ("empty-surface", Spot::Totals));
-    assert_eq!(refuse(Format::Stl, ""), ("empty-surface", Spot::Totals));
+    assert_eq!(refuse(Format::Stl, &none), ("empty-surface", Spot::File));
+    assert_eq!(refuse(Format::Stl, ""), ("empty-surface", Spot::File));
     let text = stl_text("endsolid");
     assert_eq!(refuse(Format::Stl, &text[..text.len() - 40]).0, "truncated-file");
     let nan = text.replacen("vertex 1e0", "vertex nan", 1);

@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use super::super::draft::Draft;
 use super::super::error::Result;
+use super::super::output_files::OutputFiles;
 use super::super::stream::Stream;
 
 /// A file being written.
@@ -17,13 +17,13 @@ pub(super) struct FoamFile {
 impl FoamFile {
     /// Begins `dir/object`, which will need `bytes`.
     pub fn create(
-        draft: &mut Draft,
+        outputs: &mut OutputFiles,
         (dir, object, class): (&Path, &str, &str),
         note: &str,
         ascii: bool,
         bytes: u64,
     ) -> Result<Self> {
-        let path = draft.create(&dir.join(object), bytes)?;
+        let path = outputs.create(&dir.join(object), bytes)?;
         let mut stream = Stream::open(&path)?;
         let format = if ascii { "ascii" } else { "binary" };
         let note = match note {
@@ -90,32 +90,24 @@ impl FoamFile {
 
     /// A triangle of a list of faces; in binary its vertices alone.
     #[inline]
-    pub fn face(&mut self, [a, b, c]: [u32; 3]) -> Result<()> {
+    pub fn face(&mut self, face: [u32; 3]) -> Result<()> {
         if self.ascii {
             self.stream.text("3(");
-            self.stream.integer(a.into(), b' ');
-            self.stream.integer(b.into(), b' ');
-            self.stream.integer(c.into(), b')');
+            self.stream.integers(face.map(u64::from), b' ', b')');
             self.stream.text("\n");
         } else {
-            for v in [a, b, c] {
-                self.stream.bytes(&v.to_le_bytes());
-            }
+            face.iter().for_each(|v| self.stream.bytes(&v.to_le_bytes()));
         }
         self.stream.end()
     }
 
-    pub fn point(&mut self, [x, y, z]: [f64; 3]) -> Result<()> {
+    pub fn point(&mut self, point: [f64; 3]) -> Result<()> {
         if self.ascii {
             self.stream.text("(");
-            self.stream.double(x, b' ');
-            self.stream.double(y, b' ');
-            self.stream.double(z, b')');
+            self.stream.doubles(point, b' ', b')');
             self.stream.text("\n");
         } else {
-            for x in [x, y, z] {
-                self.stream.bytes(&x.to_le_bytes());
-            }
+            self.stream.double_bytes(point);
         }
         self.stream.end()
     }

@@ -1,6 +1,6 @@
 //! OpenFOAM: `constant/polyMesh` of the whole, or `processorN/constant/polyMesh` of each sub-domain with its numbers in the whole.
 //!
-//! Faces stand in the order that OpenFOAM asks for: those with two cells by owner, then by neighbor; then patch by patch. A patch for each
+//! Faces are in OpenFOAM's order: those with two cells by owner, then by neighbor; then patch by patch. A patch for each
 //! label with faces on the boundary, a face zone for each label with cells on both sides, a cell zone for each region. The faces that two
 //! sub-domains share are patches of both, in one order, and begin at the same vertex. Reading order: `faces`, `serial`, `processors`,
 //! `polymesh` and `file` (what is written).
@@ -14,12 +14,12 @@ mod serial;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::{Result, WriteError};
 use super::merged::Merged;
 use super::names::set_names;
+use super::output_files::OutputFiles;
 use super::report::FileCounts;
-use super::selection::Selection;
+use super::selection::ExportSelection;
 use faces::FaceWalk;
 use polymesh::{Names, Size};
 
@@ -29,9 +29,9 @@ const SCRATCH_BYTES: u64 = 4 * 16 + 2 * 24;
 /// Writes the mesh into the case that `out`, an empty file for ParaView, stands in.
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
 ) -> Result<FileCounts> {
     // Every tetrahedron has fewer than four faces to itself, and labels have 31 bits.
     mesh.check_limits(out, i32::MAX as u64 / 4)?;
@@ -39,15 +39,15 @@ pub(super) fn write(
     let ascii = selection.ascii;
     let mut walk = FaceWalk::new(mesh)?;
     let names = names(mesh, &walk)?;
-    draft.create(out, needed_bytes(mesh, ascii))?;
+    outputs.create(out, needed_bytes(mesh, ascii))?;
     if selection.pieces {
         refuse_more_processors(&case, mesh.parts().len())?;
-        return processors::write(mesh, draft, &case, (&mut walk, &names), selection);
+        return processors::write(mesh, outputs, &case, (&mut walk, &names), selection);
     }
-    serial::write(mesh, draft, &case, (&mut walk, &names), ascii)
+    serial::write(mesh, outputs, &case, (&mut walk, &names), ascii)
 }
 
-/// About what all files need, and the sorted faces of the largest sub-domain beside them.
+/// Approximate bytes of all files and of the sorted faces of the largest sub-domain.
 fn needed_bytes(mesh: &Merged, ascii: bool) -> u64 {
     let parts = mesh.parts();
     let cells = mesh.n_tets();
@@ -61,7 +61,7 @@ fn needed_bytes(mesh: &Merged, ascii: bool) -> u64 {
     size.bytes(ascii) + SCRATCH_BYTES * largest.unwrap_or(0)
 }
 
-/// A case that was decomposed into more parts would mix the meshes.
+/// Refuses a case that was decomposed into more parts: the meshes would mix.
 fn refuse_more_processors(case: &Path, n: usize) -> Result<()> {
     let path = case.join(format!("processor{n}"));
     if !path.exists() {
@@ -73,7 +73,7 @@ fn refuse_more_processors(case: &Path, n: usize) -> Result<()> {
     Err(WriteError::Io { path, source })
 }
 
-/// What patches and zones are called, the same in every processor.
+/// Names of patches and zones, the same in every processor.
 fn names(mesh: &mut Merged, walk: &FaceWalk) -> Result<Names> {
     let census = &walk.census;
     let patches: BTreeSet<u32> = (census.patches.iter().flat_map(|p| p.keys()).copied()).collect();

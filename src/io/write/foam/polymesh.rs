@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::super::draft::Draft;
 use super::super::error::Result;
+use super::super::output_files::OutputFiles;
 use super::file::FoamFile;
 use tetdb_base::storage::{Sorter, sort_record};
 
@@ -13,14 +13,14 @@ pub(super) fn mesh_dir(root: &Path) -> PathBuf {
     root.join("constant").join("polyMesh")
 }
 
-/// What patches and zones are called, by label and region, in the order in which they are written.
+/// Names of patches and zones by label and region, in the order in which they are written.
 pub(super) struct Names {
     pub patches: BTreeMap<u32, String>,
     pub face_zones: BTreeMap<u32, String>,
     pub cell_zones: BTreeMap<u32, String>,
 }
 
-/// How much a mesh has.
+/// Counts of a mesh.
 #[derive(Clone, Copy)]
 pub(super) struct Size {
     pub points: u64,
@@ -30,7 +30,7 @@ pub(super) struct Size {
 }
 
 impl Size {
-    /// About what its files need.
+    /// Approximate bytes of the files.
     pub fn bytes(&self, ascii: bool) -> u64 {
         let (number, point) = if ascii { (8, 50) } else { (4, 24) };
         point * self.points + number * (5 * self.faces + self.inner + self.cells)
@@ -54,12 +54,12 @@ pub(super) struct FaceFiles {
 }
 
 impl FaceFiles {
-    pub fn create(draft: &mut Draft, dir: &Path, size: Size, ascii: bool) -> Result<Self> {
+    pub fn create(outputs: &mut OutputFiles, dir: &Path, size: Size, ascii: bool) -> Result<Self> {
         let class = if ascii { "faceList" } else { "faceCompactList" };
         let note = size.note();
         let labels = if ascii { 8 } else { 4 };
         let mut open = |object, class, bytes| {
-            FoamFile::create(draft, (dir, object, class), &note, ascii, bytes)
+            FoamFile::create(outputs, (dir, object, class), &note, ascii, bytes)
         };
         let mut faces = open("faces", class, 4 * labels * size.faces)?;
         let mut owner = open("owner", "labelList", labels * size.faces)?;
@@ -91,7 +91,7 @@ impl FaceFiles {
         self.faces.face(vertices)
     }
 
-    /// How many faces are written.
+    /// Number of faces written so far.
     pub fn written(&self) -> u64 {
         self.written
     }
@@ -109,7 +109,7 @@ impl FaceFiles {
 }
 
 /// A patch of the file `boundary`.
-pub(super) struct Patch {
+pub(super) struct FoamPatch {
     pub name: String,
     /// This processor and the one behind the patch.
     pub between: Option<[usize; 2]>,
@@ -118,13 +118,13 @@ pub(super) struct Patch {
 
 /// Writes `boundary`.
 pub(super) fn write_boundary(
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     dir: &Path,
     mut start: u64,
-    patches: &[Patch],
+    patches: &[FoamPatch],
 ) -> Result<()> {
     let what = (dir, "boundary", "polyBoundaryMesh");
-    let mut file = FoamFile::create(draft, what, "", true, 0)?;
+    let mut file = FoamFile::create(outputs, what, "", true, 0)?;
     file.text(&format!("{}\n(\n", patches.len()));
     for patch in patches {
         let kind = match patch.between {
@@ -146,14 +146,14 @@ pub(super) fn write_boundary(
 
 /// Writes a list of labels as a file of its own.
 pub(super) fn write_labels(
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     (dir, object): (&Path, &str),
     n: u64,
     ascii: bool,
     fill: impl FnOnce(&mut FoamFile) -> Result<()>,
 ) -> Result<()> {
     let bytes = n * if ascii { 8 } else { 4 };
-    let mut file = FoamFile::create(draft, (dir, object, "labelList"), "", ascii, bytes)?;
+    let mut file = FoamFile::create(outputs, (dir, object, "labelList"), "", ascii, bytes)?;
     file.list(n, fill)?;
     file.finish()
 }
@@ -193,10 +193,10 @@ impl Zones {
         Ok(())
     }
 
-    /// Writes `cellZones` or `faceZones` with all of `names`, also those that nothing here is in.
+    /// Writes `cellZones` or `faceZones` with all of `names`; a zone may be empty.
     pub fn write(
         self,
-        draft: &mut Draft,
+        outputs: &mut OutputFiles,
         dir: &Path,
         names: &BTreeMap<u32, String>,
         ascii: bool,
@@ -207,7 +207,7 @@ impl Zones {
         };
         let n: u64 = self.counts.values().sum();
         let bytes = 5 * n;
-        let mut file = FoamFile::create(draft, (dir, object, "regIOobject"), "", ascii, bytes)?;
+        let mut file = FoamFile::create(outputs, (dir, object, "regIOobject"), "", ascii, bytes)?;
         let mut items = self.items.finish()?;
         let mut flips = self.flips.map(Sorter::finish).transpose()?;
         file.text(&format!("{}\n(\n", names.len()));

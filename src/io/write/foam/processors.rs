@@ -3,61 +3,61 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::super::draft::Draft;
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
+use super::super::merged::{Merged, OpenedPart};
+use super::super::output_files::OutputFiles;
 use super::super::report::FileCounts;
-use super::super::selection::Selection;
-use super::super::stream::{Records, scratch};
+use super::super::selection::ExportSelection;
+use super::super::stream::{RecordReader, scratch};
 use super::faces::{FaceWalk, PartFaces, zone_of};
 use super::file::FoamFile;
 use super::polymesh::{
-    FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary, write_labels,
+    FaceFiles, FoamPatch, Names, Size, Zones, mesh_dir, write_boundary, write_labels,
 };
 use super::serial::{WithTwoCells, in_order};
-use tetdb_base::storage::{Sorter, sort_record};
+use tetdb_base::storage::{Sorted, Sorter, sort_record};
+use tetdb_store::sealed::MergeReader;
 
 sort_record! {
-    /// Where a face between two sub-domains is in the whole.
-    struct Address {
+    /// A face between two sub-domains and its number in the whole.
+    struct FaceAddress {
         rank: u32,
         other: u32,
         cut: u32,
         index: u32,
-        /// Its number in the whole, from 1.
+        /// Number of the face in the whole, from 1.
         face: u32,
     }
 }
 
-/// What is written for every processor.
-struct Job<'j> {
+/// Inputs that all processors share, and the state of the walk over them.
+struct ProcessorFiles<'j> {
     case: &'j Path,
     names: &'j Names,
     ascii: bool,
     /// Faces of the whole before those of the first patch.
     n_inner: u64,
-    /// Faces of each patch in the sub-domains before this one, and before it in the whole.
+    /// For each patch, the number of faces of the whole before those of the current sub-domain.
     patch_starts: BTreeMap<u32, u64>,
 }
 
-/// Writes the processors that are selected; all are read, for numbers in the whole depend on those before.
+/// Writes the selected processors. All are read, because numbers in the whole depend on the processors before.
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     case: &Path,
     (walk, names): (&mut FaceWalk, &Names),
-    selection: &Selection,
+    selection: &ExportSelection,
 ) -> Result<FileCounts> {
     mesh.expect_passes(0, 2);
     let ascii = selection.ascii;
     let parts = mesh.parts();
     let mut counts = FileCounts::default();
     let n_between: u64 = (walk.census.between.iter().flat_map(|b| b.values())).sum();
-    let inner =
-        |(p, part): (usize, &super::super::merged::Part)| walk.census.n_inner(p, part.n_tets);
-    let n_inner = parts.iter().enumerate().map(inner).sum::<u64>() + n_between / 2;
+    let inner = parts.iter().enumerate().map(|(p, part)| walk.census.n_inner(p, part.n_tets));
+    let n_inner = inner.sum::<u64>() + n_between / 2;
     let mut start = n_inner;
-    let mut job = Job { case, names, ascii, n_inner, patch_starts: BTreeMap::new() };
+    let mut job = ProcessorFiles { case, names, ascii, n_inner, patch_starts: BTreeMap::new() };
     for &label in names.patches.keys() {
         job.patch_starts.insert(label, start);
         start += (walk.census.patches.iter().filter_map(|p| p.get(&label))).sum::<u64>();
@@ -68,40 +68,48 @@ pub(super) fn write(
         let is_written = selection.writes_piece(part.rank);
         let faces = walk.part(mesh, p)?;
         let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
-        job.faces(mesh, draft, walk, (p, faces, sizes), is_written, (&mut next, &mut addresses))?;
+        job.faces(mesh, outputs, walk, (p, faces, sizes), is_written, (&mut next, &mut addresses))?;
         if is_written {
-            job.points_and_cells(mesh, draft, p, sizes)?;
+            job.points_and_cells(mesh, outputs, p, sizes)?;
             counts.vertices += sizes.points;
             counts.tets += sizes.cells;
             counts.triangles += sizes.faces - sizes.inner;
         }
     }
     mesh.expect_count("inner faces", job.n_inner, next)?;
-    let mut addresses = addresses.finish()?.peekable();
-    for (p, part) in parts.iter().enumerate() {
+    write_face_addresses(mesh, outputs, (walk, &job), selection, addresses.finish()?)?;
+    Ok(counts)
+}
+
+/// Writes the number in the whole of each face of the selected processors, from 1 and negative where the whole has the opposite direction.
+fn write_face_addresses(
+    mesh: &Merged,
+    outputs: &mut OutputFiles,
+    (walk, job): (&FaceWalk, &ProcessorFiles),
+    selection: &ExportSelection,
+    addresses: Sorted<FaceAddress>,
+) -> Result<()> {
+    let (ascii, mut addresses) = (job.ascii, MergeReader::new(addresses));
+    for (p, part) in mesh.parts().iter().enumerate() {
         let is_written = selection.writes_piece(part.rank);
-        let of_part = std::iter::from_fn(|| {
-            addresses.next_if(|a| a.as_ref().map_or(true, |a| a.rank == part.rank))
-        });
+        let of_part = std::iter::from_fn(|| addresses.next_if(|a| a.rank == part.rank).transpose());
         if !is_written {
             of_part.for_each(drop);
             continue;
         }
         let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
         let dir = job.dir(part.rank);
-        write_labels(draft, (&dir, "faceProcAddressing"), sizes.faces, ascii, |file| {
-            let mut known = Records::<4>::open(&scratch_path(mesh.dir(), part.rank), 0)?;
-            while let Some(label) = known.next()? {
-                file.label(i32::from_le_bytes(label))?;
-            }
+        write_labels(outputs, (&dir, "faceProcAddressing"), sizes.faces, ascii, |file| {
+            RecordReader::open(&scratch_path(mesh.dir(), part.rank), 0)?
+                .each(|label| file.label(i32::from_le_bytes(*label)))?;
             of_part.into_iter().try_for_each(|address| {
-                let Address { rank, other, face, .. } = address?;
+                let FaceAddress { rank, other, face, .. } = address?;
                 // The whole has the face as the lower one sees it.
                 file.label(if rank < other { face as i32 } else { -(face as i32) })
             })
         })?;
     }
-    Ok(counts)
+    Ok(())
 }
 
 fn scratch_path(dir: &Path, rank: u32) -> std::path::PathBuf {
@@ -119,26 +127,26 @@ fn sizes(walk: &FaceWalk, p: usize, points: u64, cells: u64) -> Size {
     }
 }
 
-impl Job<'_> {
+impl ProcessorFiles<'_> {
     fn dir(&self, rank: u32) -> std::path::PathBuf {
         mesh_dir(&self.case.join(format!("processor{rank}")))
     }
 
-    /// Faces, boundary and face zones of a sub-domain; its addresses but for faces between sub-domains, which go to `addresses`.
+    /// Writes faces, boundary and face zones of a sub-domain, and the addresses of its faces; `addresses` gets those of faces between sub-domains.
     fn faces(
         &mut self,
         mesh: &mut Merged,
-        draft: &mut Draft,
+        outputs: &mut OutputFiles,
         walk: &FaceWalk,
         (p, faces, size): (usize, PartFaces, Size),
         is_written: bool,
-        (next, addresses): (&mut u64, &mut Sorter<Address>),
+        (next, addresses): (&mut u64, &mut Sorter<FaceAddress>),
     ) -> Result<()> {
         let rank = mesh.parts()[p].rank;
         let dir = self.dir(rank);
         let numbers = mesh.numbers_of(p)?;
         let mut files = match is_written {
-            true => Some(FaceFiles::create(draft, &dir, size, self.ascii)?),
+            true => Some(FaceFiles::create(outputs, &dir, size, self.ascii)?),
             false => None,
         };
         let mut known = scratch(&scratch_path(mesh.dir(), rank))?;
@@ -153,13 +161,12 @@ impl Job<'_> {
                     if let Some((zone, is_flipped)) = zone_of(face.zone) {
                         zones.push(zone, files.written() as u32, is_flipped)?;
                     }
-                    known.bytes(&(*next as u32).to_le_bytes());
-                    known.end()?;
+                    known.record(&(*next as u32).to_le_bytes())?;
                     files.inner(face.owner, face.neighbor, face.vertices)
                 }
                 WithTwoCells::Across(upper) => {
                     for (rank, other) in [(rank, upper.other), (upper.other, rank)] {
-                        addresses.push(Address {
+                        addresses.push(FaceAddress {
                             rank,
                             other,
                             cut: upper.cut,
@@ -177,8 +184,7 @@ impl Job<'_> {
             let start = start.expect("patches were counted from the same faces");
             *start += 1;
             if let Some(files) = &mut files {
-                known.bytes(&(*start as u32).to_le_bytes());
-                known.end()?;
+                known.record(&(*start as u32).to_le_bytes())?;
                 files.outer(face.owner, face.vertices)?;
             }
         }
@@ -191,26 +197,22 @@ impl Job<'_> {
             if let Some((zone, is_flipped)) = zone_of(face.zone) {
                 zones.push(zone, files.written() as u32, is_flipped)?;
             }
-            // Both sides begin with the vertex that has the least number in the whole; its neighbor then goes round the other way.
-            let [a, b, c] = face.vertices;
-            let [i, j, k] = numbers.of(face.vertices)?;
-            let turned = match i.min(j).min(k) {
-                least if least == i => [a, b, c],
-                least if least == j => [b, c, a],
-                _ => [c, a, b],
-            };
-            files.outer(face.owner, turned)?;
+            // Both sides begin with the vertex that has the least number in the whole, and go round in opposite directions.
+            let in_whole = numbers.vertices(face.vertices)?;
+            let mut vertices = face.vertices;
+            vertices.rotate_left((0..3).min_by_key(|&i| in_whole[i]).unwrap_or(0));
+            files.outer(face.owner, vertices)?;
         }
         mesh.expect_count("faces", size.faces, files.written())?;
         files.finish()?;
-        zones.write(draft, &dir, &self.names.face_zones, self.ascii)?;
-        self.boundary(mesh, draft, walk, p, size)
+        zones.write(outputs, &dir, &self.names.face_zones, self.ascii)?;
+        self.boundary(mesh, outputs, walk, p, size)
     }
 
     fn boundary(
         &self,
         mesh: &Merged,
-        draft: &mut Draft,
+        outputs: &mut OutputFiles,
         walk: &FaceWalk,
         p: usize,
         size: Size,
@@ -218,20 +220,20 @@ impl Job<'_> {
         let here = mesh.parts()[p].rank;
         let dir = self.dir(here);
         let counts = &walk.census.patches[p];
-        let plain = self.names.patches.iter().map(|(label, name)| Patch {
+        let plain = self.names.patches.iter().map(|(label, name)| FoamPatch {
             name: name.clone(),
             between: None,
             n_faces: counts.get(label).copied().unwrap_or_default(),
         });
-        let shared = walk.census.between[p].iter().map(|(&there, &n_faces)| Patch {
+        let shared = walk.census.between[p].iter().map(|(&there, &n_faces)| FoamPatch {
             name: format!("procBoundary{here}to{there}"),
             between: Some([here as usize, there as usize]),
             n_faces,
         });
         let patches: Vec<_> = plain.chain(shared).collect();
-        write_boundary(draft, &dir, size.inner, &patches)?;
+        write_boundary(outputs, &dir, size.inner, &patches)?;
         let what = (dir.as_path(), "boundaryProcAddressing");
-        write_labels(draft, what, patches.len() as u64, self.ascii, |file| {
+        write_labels(outputs, what, patches.len() as u64, self.ascii, |file| {
             (0..).zip(&patches).try_for_each(|(number, patch)| {
                 file.label(if patch.between.is_some() { -1 } else { number })
             })
@@ -242,16 +244,16 @@ impl Job<'_> {
     fn points_and_cells(
         &self,
         mesh: &mut Merged,
-        draft: &mut Draft,
+        outputs: &mut OutputFiles,
         p: usize,
         size: Size,
     ) -> Result<()> {
         let (scratch, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
-        let Opened { mut part, numbers } = mesh.open_part(p)?;
+        let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
         let first_tet = numbers.first_tet as u32;
         let (dir, ascii) = (self.dir(part.id().rank()), self.ascii);
         let what = (dir.as_path(), "points", "vectorField");
-        let mut points = FoamFile::create(draft, what, "", ascii, 24 * size.points)?;
+        let mut points = FoamFile::create(outputs, what, "", ascii, 24 * size.points)?;
         points.list(size.points, |file| {
             for vertex in part.vertices() {
                 file.point(vertex?.point)?;
@@ -259,10 +261,10 @@ impl Job<'_> {
             Ok(())
         })?;
         points.finish()?;
-        write_labels(draft, (&dir, "pointProcAddressing"), size.points, ascii, |file| {
-            (0..size.points as u32).try_for_each(|v| file.label(numbers.of([v])?[0] as i32))
+        write_labels(outputs, (&dir, "pointProcAddressing"), size.points, ascii, |file| {
+            (0..size.points as u32).try_for_each(|v| file.label(numbers.vertices([v])?[0] as i32))
         })?;
-        write_labels(draft, (&dir, "cellProcAddressing"), size.cells, ascii, |file| {
+        write_labels(outputs, (&dir, "cellProcAddressing"), size.cells, ascii, |file| {
             (0..size.cells as u32).try_for_each(|cell| file.label((first_tet + cell) as i32))
         })?;
         let mut zones = Zones::new(&scratch, false, bytes);
@@ -271,6 +273,6 @@ impl Job<'_> {
             zones.push(tet.region, id.local(), false)?;
         }
         mesh.advance(size.cells as usize);
-        zones.write(draft, &dir, &self.names.cell_zones, ascii)
+        zones.write(outputs, &dir, &self.names.cell_zones, ascii)
     }
 }

@@ -2,20 +2,21 @@
 
 use std::path::Path;
 
-use super::super::draft::Draft;
 use super::super::error::Result;
 use super::super::merged::Merged;
+use super::super::output_files::OutputFiles;
 use super::super::report::FileCounts;
-use super::faces::{FaceWalk, Inner, Upper, zone_of};
+use super::faces::{FaceWalk, InnerFace, UpperFace, zone_of};
 use super::file::FoamFile;
-use super::polymesh::{FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary};
+use super::polymesh::{FaceFiles, FoamPatch, Names, Size, Zones, mesh_dir, write_boundary};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
+use tetdb_store::sealed::MergeReader;
 
 sort_record! {
     /// A face on the boundary of the whole.
-    struct Placed {
+    struct OrderedPatchFace {
         patch: u32,
-        /// Its place among those of all sub-domains: a cell's faces keep the order that its sub-domain alone gives them.
+        /// Number of outer faces before it, over all sub-domains: the faces of a cell keep their order.
         place: u32,
         owner: u32,
         vertices: [u32; 3],
@@ -24,23 +25,21 @@ sort_record! {
 
 /// A face with two cells in the whole, at least the first of them in the sub-domain at hand.
 pub(super) enum WithTwoCells {
-    Here(Inner),
-    Across(Upper),
+    Here(InnerFace),
+    Across(UpperFace),
 }
 
 /// Faces of a sub-domain in the order of the whole: by owner, those within it first.
 pub(super) fn in_order(
-    inner: Sorted<Inner>,
-    uppers: Sorted<Upper>,
+    inner: Sorted<InnerFace>,
+    uppers: Sorted<UpperFace>,
     mut each: impl FnMut(WithTwoCells) -> Result<()>,
 ) -> Result<()> {
-    let mut uppers = uppers.peekable();
+    let mut uppers = MergeReader::new(uppers);
     for face in inner {
         let face = face?;
-        while let Some(upper) =
-            uppers.next_if(|u| u.as_ref().map_or(true, |u| u.owner < face.owner))
-        {
-            each(WithTwoCells::Across(upper?))?;
+        while let Some(upper) = uppers.next_if(|upper| upper.owner < face.owner)? {
+            each(WithTwoCells::Across(upper))?;
         }
         each(WithTwoCells::Here(face))?;
     }
@@ -49,7 +48,7 @@ pub(super) fn in_order(
 
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     case: &Path,
     (walk, names): (&mut FaceWalk, &Names),
     ascii: bool,
@@ -65,33 +64,33 @@ pub(super) fn write(
     let inner = n_inner + n_between / 2;
     let size =
         Size { points: mesh.n_vertices(), cells: mesh.n_tets(), inner, faces: inner + n_outer };
-    write_points(mesh, draft, &dir, size, ascii)?;
-    let patches = names.patches.iter().map(|(label, name)| Patch {
+    write_points(mesh, outputs, &dir, size, ascii)?;
+    let patches = names.patches.iter().map(|(label, name)| FoamPatch {
         name: name.clone(),
         between: None,
         n_faces: (census.patches.iter().filter_map(|p| p.get(label))).sum(),
     });
-    write_boundary(draft, &dir, inner, &patches.collect::<Vec<_>>())?;
-    write_faces(mesh, draft, &dir, size, (walk, names), ascii)?;
+    write_boundary(outputs, &dir, inner, &patches.collect::<Vec<_>>())?;
+    write_faces(mesh, outputs, &dir, size, (walk, names), ascii)?;
     let mut zones = Zones::new(mesh.dir(), false, mesh.sorter_bytes());
     let mut cell = 0;
     mesh.tets(|tet| {
         cell += 1;
         zones.push(tet.region, cell - 1, false)
     })?;
-    zones.write(draft, &dir, &names.cell_zones, ascii)?;
+    zones.write(outputs, &dir, &names.cell_zones, ascii)?;
     Ok(FileCounts { vertices: size.points, tets: size.cells, triangles: n_outer })
 }
 
 fn write_points(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     dir: &Path,
     size: Size,
     ascii: bool,
 ) -> Result<()> {
     let what = (dir, "points", "vectorField");
-    let mut points = FoamFile::create(draft, what, "", ascii, 24 * size.points)?;
+    let mut points = FoamFile::create(outputs, what, "", ascii, 24 * size.points)?;
     points.begin_list(size.points);
     mesh.vertices(|_, vertex| points.point(vertex.point))?;
     points.end_list(size.points);
@@ -100,13 +99,13 @@ fn write_points(
 
 fn write_faces(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     dir: &Path,
     size: Size,
     (walk, names): (&mut FaceWalk, &Names),
     ascii: bool,
 ) -> Result<()> {
-    let mut files = FaceFiles::create(draft, dir, size, ascii)?;
+    let mut files = FaceFiles::create(outputs, dir, size, ascii)?;
     let bytes = mesh.sorter_bytes() / 4;
     let mut outer = Sorter::new(mesh.dir(), bytes);
     let mut zones = Zones::new(mesh.dir(), true, bytes);
@@ -115,7 +114,7 @@ fn write_faces(
         let faces = walk.part(mesh, p)?;
         let numbers = mesh.numbers_of(p)?;
         let first = numbers.first_tet as u32;
-        let global = |vertices| numbers.of(vertices).map(|v| v.map(|v| v as u32));
+        let global = |vertices| numbers.vertices(vertices).map(|v| v.map(|v| v as u32));
         in_order(faces.inner, faces.uppers, |face| {
             let (owner, neighbor, vertices, zone) = match face {
                 WithTwoCells::Here(f) => (f.owner, first + f.neighbor, f.vertices, f.zone),
@@ -128,7 +127,7 @@ fn write_faces(
         })?;
         for face in faces.outer {
             let face = face?;
-            outer.push(Placed {
+            outer.push(OrderedPatchFace {
                 patch: face.patch,
                 place: n_outer,
                 owner: first + face.owner,
@@ -144,5 +143,5 @@ fn write_faces(
     }
     mesh.expect_count("faces", size.faces, files.written())?;
     files.finish()?;
-    zones.write(draft, dir, &names.face_zones, ascii)
+    zones.write(outputs, dir, &names.face_zones, ascii)
 }

@@ -1,12 +1,12 @@
 //! Triangles and tetrahedra, entity by entity.
 
+use super::super::embedded::WrittenEmbedded;
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
+use super::super::merged::{Merged, OpenedPart};
 use super::super::midpoints::{ElementEdges, Midpoints};
-use super::super::wires::WrittenWires;
 use super::entities::Entities;
 use super::out::Out;
-use super::piece::Piece;
+use super::piece::GmshPiece;
 use tetdb_base::storage::{Sorter, sort_record};
 
 /// Gmsh's numbers of the types of elements, of first and of second order.
@@ -14,7 +14,7 @@ const POINT: u32 = 15;
 const LINES: [u32; 2] = [1, 8];
 const TRIANGLES: [u32; 2] = [2, 9];
 const TETRAHEDRA: [u32; 2] = [4, 11];
-/// The place of each middle of a tetrahedron's edges: Gmsh has the last two the other way round.
+/// Order of the midpoints of a tetrahedron: Gmsh exchanges the last two.
 const MIDDLES: [usize; 6] = [0, 1, 2, 3, 5, 4];
 
 sort_record! {
@@ -35,15 +35,15 @@ sort_record! {
     }
 }
 
-/// What the elements of a file are written with.
+/// The elements of a file being written.
 struct Elements<'a> {
     out: &'a mut Out,
-    /// Of each entity dimension, tag and number of elements.
+    /// Dimension, tag and number of elements of each entity.
     tags: Vec<(u32, u32, u64)>,
     order: usize,
     /// Elements before the first tetrahedron.
     n_faces: u64,
-    /// Vertices before the first middle.
+    /// Vertices before the first midpoint.
     n_vertices: u64,
     edges: Option<ElementEdges<6>>,
     /// The entity whose elements are being written.
@@ -53,38 +53,38 @@ struct Elements<'a> {
 pub(super) fn write(
     mesh: &mut Merged,
     out: &mut Out,
-    piece: &Piece,
+    piece: &GmshPiece,
     entities: &Entities,
 ) -> Result<()> {
     let n_faces = mesh.n_faces();
     let tags = entities.tags();
-    let wires = &entities.wires;
-    let n_wires = (wires.edges.len() + wires.points.len()) as u64;
-    let curves = wires.edge_labels();
-    let blocks = tags.len() + curves.len() + wires.points.len();
-    let total = entities.n_faces() + entities.n_tets() + n_wires;
-    for n in [blocks as u64, total, 1, n_faces + mesh.n_tets() + n_wires] {
+    let embedded = &entities.embedded;
+    let n_embedded = (embedded.edges.len() + embedded.points.len()) as u64;
+    let curves = embedded.edge_labels();
+    let blocks = tags.len() + curves.len() + embedded.points.len();
+    let total = entities.n_faces() + entities.n_tets() + n_embedded;
+    for n in [blocks as u64, total, 1, n_faces + mesh.n_tets() + n_embedded] {
         out.size(n);
     }
     out.end()?;
     let mut elements = Elements {
         out,
         tags,
-        order: usize::from(piece.middles.is_some()),
+        order: usize::from(piece.midpoints.is_some()),
         n_faces,
         n_vertices: mesh.n_vertices(),
-        edges: piece.middles.map(Midpoints::tets).transpose()?,
+        edges: piece.midpoints.map(Midpoints::tets).transpose()?,
         entity: None,
     };
     triangles(mesh, &mut elements, piece, entities)?;
     for &p in piece.which {
-        let Opened { mut part, numbers } = mesh.open_part(p)?;
+        let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
         let rank = part.id().rank();
         if let Some(entity) = entities.only_volume(rank) {
             for tet in part.tets() {
                 let (id, tet) = tet?;
                 if let Some(number) = numbers.tet(id.local()) {
-                    elements.tet(entity, number, numbers.of(tet.nodes)?)?;
+                    elements.tet(entity, number, numbers.vertices(tet.nodes)?)?;
                 }
             }
         } else {
@@ -101,7 +101,7 @@ pub(super) fn write(
             }
             for tet in sorter.finish()? {
                 let tet = tet?;
-                elements.tet(tet.entity, tet.number, numbers.of(tet.nodes)?)?;
+                elements.tet(tet.entity, tet.number, numbers.vertices(tet.nodes)?)?;
             }
         }
         mesh.advance(part.row().tets as usize);
@@ -111,9 +111,9 @@ pub(super) fn write(
         elements.tet(entity, ghost.number, ghost.nodes.0)
     })?;
     let n_before = n_faces + mesh.n_tets();
-    lines(mesh, out, piece, (wires, n_before))?;
-    let mut number = n_before + wires.edges.len() as u64;
-    for (tag, point) in (1u32..).zip(&wires.points) {
+    lines(mesh, out, piece, (embedded, n_before))?;
+    let mut number = n_before + embedded.edges.len() as u64;
+    for (tag, point) in (1u32..).zip(&embedded.points) {
         for word in [0, tag, POINT] {
             out.int(word);
         }
@@ -124,25 +124,25 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Embedded edges, those of each label as a curve, numbered behind `n_before` other elements.
+/// Writes embedded edges, those of each label as a curve, numbered after `n_before` other elements.
 fn lines(
     mesh: &Merged,
     out: &mut Out,
-    piece: &Piece,
-    (wires, n_before): (&WrittenWires, u64),
+    piece: &GmshPiece,
+    (embedded, n_before): (&WrittenEmbedded, u64),
 ) -> Result<()> {
-    let mut middles = piece.middles.map(Midpoints::lines).transpose()?;
-    let mut edges = (n_before + 1..).zip(&wires.edges);
-    for (label, n) in wires.edge_labels() {
-        for word in [1, label + 1, LINES[usize::from(middles.is_some())]] {
+    let mut midpoints = piece.midpoints.map(Midpoints::lines).transpose()?;
+    let mut edges = (n_before + 1..).zip(&embedded.edges);
+    for (label, n) in embedded.edge_labels() {
+        for word in [1, label + 1, LINES[usize::from(midpoints.is_some())]] {
             out.int(word);
         }
         out.size(n);
         out.end()?;
         for (number, ([a, b], _)) in edges.by_ref().take(n as usize) {
             [number, a + 1, b + 1].into_iter().for_each(|n| out.size(n));
-            if let Some(middles) = &mut middles {
-                out.size(mesh.n_vertices() + middles.next()?[0] + 1);
+            if let Some(midpoints) = &mut midpoints {
+                out.size(mesh.n_vertices() + midpoints.next()?[0] + 1);
             }
             out.end()?;
         }
@@ -151,7 +151,7 @@ fn lines(
 }
 
 impl Elements<'_> {
-    /// Begins the elements of an entity, unless they are begun.
+    /// Begins the elements of an entity, unless it is the current one.
     fn begin(&mut self, entity: u32, types: [u32; 2]) -> Result<()> {
         if self.entity.replace(entity) == Some(entity) {
             return Ok(());
@@ -169,7 +169,7 @@ impl Elements<'_> {
         self.out.size(self.n_faces + number + 1);
         nodes.iter().for_each(|v| self.out.size(v + 1));
         if let Some(edges) = &mut self.edges {
-            let edges = edges.of(number)?;
+            let edges = edges.element(number)?;
             MIDDLES.iter().for_each(|&i| self.out.size(self.n_vertices + edges[i] + 1));
         }
         self.out.end()
@@ -179,7 +179,7 @@ impl Elements<'_> {
 fn triangles(
     mesh: &Merged,
     elements: &mut Elements,
-    piece: &Piece,
+    piece: &GmshPiece,
     entities: &Entities,
 ) -> Result<()> {
     let mut sorter = Sorter::new(mesh.dir(), mesh.sorter_bytes());
@@ -191,14 +191,14 @@ fn triangles(
         number += 1;
         Ok(())
     })?;
-    let mut edges = piece.middles.map(Midpoints::faces).transpose()?;
+    let mut edges = piece.midpoints.map(Midpoints::faces).transpose()?;
     for face in sorter.finish()? {
         let face = face?;
         elements.begin(face.entity, TRIANGLES)?;
         elements.out.size(face.number + 1);
         face.vertices.iter().for_each(|v| elements.out.size(v + 1));
         if let Some(edges) = &mut edges {
-            for edge in edges.of(face.number)? {
+            for edge in edges.element(face.number)? {
                 elements.out.size(elements.n_vertices + edge + 1);
             }
         }

@@ -1,38 +1,40 @@
-//! Labels and regions, and what of them lies in which partition.
+//! Entities: labels and regions, and their parts in the partitions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::super::embedded::WrittenEmbedded;
 use super::super::error::Result;
-use super::super::faces::Face;
+use super::super::faces::MergedFace;
 use super::super::merged::Merged;
 use super::super::names::quotable;
-use super::super::wires::WrittenWires;
 use super::out::Out;
-use super::piece::Piece;
+use super::piece::GmshPiece;
 
 /// The least and the greatest coordinates.
 type Bounds = [[f64; 3]; 2];
 
-/// What is written: of each label and region, the elements in each partition. The place of an entity counts surfaces, then volumes.
+/// The entities of a file: for each label and region, the elements in each partition. The place of an entity counts surfaces, then volumes.
 ///
-/// A label behind all others is the faces towards a sub-domain; where that is written too, they have no physical group and lie in both partitions.
+/// A label behind all others stands for the faces towards a sub-domain. Where that sub-domain is written too, these faces have no physical group
+/// and lie in both partitions.
 pub(super) struct Entities {
-    /// Label and rank, ascending, and how many faces.
+    /// Label and rank, ascending, and the number of faces.
     surfaces: Vec<((u32, u32), u64)>,
-    /// Region and rank, ascending, and how many tetrahedra.
+    /// Region and rank, ascending, and the number of tetrahedra.
     volumes: Vec<((u32, u32), u64)>,
-    /// Of all that is written; it bounds every entity, if not closely.
+    /// Bounds of the whole file, which every entity gets.
     bounds: Bounds,
     /// Ranks of all partitions, also of those in other files.
     ranks: Vec<u32>,
     n_labels: u32,
-    /// Edges are in a curve for each label, each point is an entity of its own, numbered from 1. None in a file of one partition.
-    pub wires: WrittenWires,
+    /// Embedded edges and points: edges are in a curve for each label, each point is an entity of its own, numbered from 1. A file of one
+    /// partition has none.
+    pub embedded: WrittenEmbedded,
 }
 
 impl Entities {
-    /// Counts those of a file. Errors: damage, the disk.
-    pub fn gather(mesh: &mut Merged, piece: &Piece) -> Result<Self> {
+    /// Counts the entities of a file. Errors: damage, the disk.
+    pub fn gather(mesh: &mut Merged, piece: &GmshPiece) -> Result<Self> {
         let parts = mesh.parts();
         let mut entities = Self {
             surfaces: Vec::new(),
@@ -40,10 +42,10 @@ impl Entities {
             bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             ranks: parts.iter().map(|part| part.rank).collect(),
             n_labels: mesh.n_labels(),
-            wires: WrittenWires::default(),
+            embedded: WrittenEmbedded::default(),
         };
         if piece.which.len() == parts.len() {
-            entities.wires = mesh.wires().clone();
+            entities.embedded = mesh.embedded().clone();
         }
         let here: BTreeSet<u32> = piece.which.iter().map(|&p| parts[p].rank).collect();
         let mut surfaces = BTreeMap::<_, u64>::new();
@@ -104,13 +106,13 @@ impl Entities {
     }
 
     /// The place of a face's surface, if it is written.
-    pub fn surface(&self, face: &Face) -> Option<u32> {
+    pub fn surface(&self, face: &MergedFace) -> Option<u32> {
         let key = (face.label, face.subdomain);
         let found = self.surfaces.binary_search_by_key(&key, |s| s.0);
         found.ok().map(|place| place as u32)
     }
 
-    /// The place of a region's volume in a partition, which has tetrahedra of it.
+    /// The place of a region's volume in a partition, which must have tetrahedra of the region.
     pub fn volume(&self, region: u32, rank: u32) -> u32 {
         let found = self.volumes.binary_search_by_key(&(region, rank), |v| v.0);
         let place = found.expect("regions were counted from the same tetrahedra");
@@ -126,7 +128,7 @@ impl Entities {
         }
     }
 
-    /// Dimension and tag of the entity at each place, and how many elements it has.
+    /// Dimension, tag and number of elements of the entity at each place.
     pub fn tags(&self) -> Vec<(u32, u32, u64)> {
         let whole = |all: &[((u32, u32), u64)]| all.last().map_or(0, |(key, _)| key.0 + 1);
         let first = whole(&self.surfaces).max(whole(&self.volumes)) + 1;
@@ -139,7 +141,7 @@ impl Entities {
         (0..).zip(parts).map(tag).collect()
     }
 
-    /// Those with a physical group.
+    /// The labels with a physical group.
     fn labels(&self) -> BTreeSet<u32> {
         let labels = self.surfaces.iter().map(|(key, _)| key.0);
         labels.filter(|&label| self.neighbor(label).is_none()).collect()
@@ -150,34 +152,18 @@ impl Entities {
     }
 
     pub fn physical_names(&self, mesh: &Merged) -> String {
-        let (labels, regions) = (self.labels(), self.regions());
-        let points = self.wires.point_labels().into_keys().map(|l| (0, l));
-        let edges = self.wires.edge_labels().into_keys().map(|l| (1, l));
-        let wires: Vec<(u32, u32)> = points.chain(edges).collect();
-        let n = wires.len() + labels.len() + regions.len();
-        let mut text = format!("{n}\n");
-        for (dim, label) in wires {
-            let name = mesh.label_name(label);
-            text += &format!("{dim} {} \"{}\"\n", label + 1, quotable(&name));
-        }
-        for label in labels {
-            text += &format!("2 {} \"{}\"\n", label + 1, quotable(&mesh.label_name(label)));
-        }
-        for region in regions {
-            text += &format!("3 {region} \"{}\"\n", quotable(&mesh.region_name(region)));
-        }
-        text
+        physical_names(mesh, &self.embedded, self.labels(), self.regions())
     }
 
     fn put_bounds(&self, out: &mut Out) {
         self.bounds.iter().flatten().for_each(|&x| out.double(x));
     }
 
-    /// Labels and regions as surfaces and volumes: tag, bounds, physical tag; what bounds them is not listed.
+    /// Writes labels and regions as surfaces and volumes: tag, bounds, physical tag, no bounding entities.
     pub fn write_model(&self, out: &mut Out) -> Result<()> {
         let (labels, regions) = (self.labels(), self.regions());
-        let curves = self.wires.edge_labels();
-        let points = &self.wires.points;
+        let curves = self.embedded.edge_labels();
+        let points = &self.embedded.points;
         for n in [points.len(), curves.len(), labels.len(), regions.len()] {
             out.size(n as u64);
         }
@@ -201,7 +187,7 @@ impl Entities {
         Ok(())
     }
 
-    /// What of them is in which partition.
+    /// Writes the parts of labels and regions in the partitions.
     pub fn write_partitioned(&self, out: &mut Out, ghosts: bool) -> Result<()> {
         out.size(self.ranks.len() as u64);
         let tags = self.tags();
@@ -220,7 +206,7 @@ impl Entities {
         let (surfaces, volumes) = tags.split_at(self.surfaces.len());
         for ((_, tag, _), ((label, rank), _)) in surfaces.iter().zip(&self.surfaces) {
             match self.neighbor(*label) {
-                // Faces between partitions lie in a volume, which of the regions there matters to nobody.
+                // Faces between partitions lie in a volume; any region will do.
                 Some(other) => {
                     let region = self.regions().first().copied().unwrap_or_default();
                     self.put(out, [*tag, 3, region], &[*rank, other], None)?;
@@ -234,7 +220,7 @@ impl Entities {
         Ok(())
     }
 
-    /// An entity of partitions: its tag, dimension and tag of what it is a part of, ranks, physical group.
+    /// Writes an entity of partitions: its tag, dimension and tag of its parent, ranks, physical group.
     fn put(
         &self,
         out: &mut Out,
@@ -251,4 +237,23 @@ impl Entities {
         out.size(0);
         out.end()
     }
+}
+
+/// Number and names of physical groups: points (dimension 0), edges (1) and surfaces (2) by label, volumes (3) by region.
+pub(in crate::write) fn physical_names(
+    mesh: &Merged,
+    embedded: &WrittenEmbedded,
+    labels: impl IntoIterator<Item = u32>,
+    regions: impl IntoIterator<Item = u32>,
+) -> String {
+    let points = embedded.point_labels().into_keys().map(|label| (0, label));
+    let edges = embedded.edge_labels().into_keys().map(|label| (1, label));
+    let surfaces = labels.into_iter().map(|label| (2, label));
+    let labelled = points.chain(edges).chain(surfaces);
+    let labelled = labelled.map(|(dim, label)| (dim, label + 1, mesh.label_name(label)));
+    let volumes = regions.into_iter().map(|region| (3, region, mesh.region_name(region)));
+    let lines: Vec<String> = (labelled.chain(volumes))
+        .map(|(dim, tag, name)| format!("{dim} {tag} \"{}\"\n", quotable(&name)))
+        .collect();
+    format!("{}\n{}", lines.len(), lines.concat())
 }

@@ -1,51 +1,47 @@
-//! Tetrahedra that other partitions see: those that share a vertex with one of theirs.
+//! Ghosts: tetrahedra that share a vertex with one of another partition.
 
 use std::path::PathBuf;
 
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
-use super::super::stream::{Records, scratch};
+use super::super::merged::{Merged, OpenedPart};
+use super::super::stream::{RecordReader, save};
 use super::out::Out;
-use tetdb_base::storage::{Payload, SortRecord, Sorter, sort_record};
+use tetdb_base::storage::{Payload, Sorter, sort_record};
+use tetdb_store::sealed::MergeReader;
 
 sort_record! {
-    /// A tetrahedron as another partition sees it.
+    /// A tetrahedron as a ghost of another partition.
     pub(super) struct Ghost {
-        /// Place of the partition that sees it.
+        /// Place of the partition that has it as a ghost.
         to: u32,
         pub region: u32,
-        /// Rank of its own.
+        /// Rank of its own partition.
         pub from: u32,
-        /// Its number among all tetrahedra.
+        /// Number of the tetrahedron in the whole.
         pub number: u64,
         pub nodes: Payload<[u64; 4]>,
         pub points: Payload<[f64; 12]>,
     }
 }
 
-const BYTES: usize = size_of::<<Ghost as SortRecord>::Bytes>();
-
-/// Those of all partitions, in a scratch file.
+/// Ghosts of all partitions, in a scratch file.
 pub(super) struct Ghosts {
-    /// Where those of each partition begin.
+    /// Number of the first ghost of each partition, and the number of all.
     firsts: Vec<u64>,
     path: PathBuf,
 }
 
 impl Ghosts {
-    /// Finds them. Errors: damage, the disk.
+    /// Finds the ghosts. Errors: damage, the disk.
     pub fn gather(mesh: &mut Merged) -> Result<Self> {
-        let mut sharers = mesh.sharers()?.peekable();
+        let mut sharers = MergeReader::new(mesh.sharers()?);
         let mut sorter = Sorter::new(mesh.dir(), mesh.sorter_bytes());
         for p in 0..mesh.n_parts() {
-            // Vertices of this sub-domain by number, ascending, and who else has them; places among all.
+            // Vertices of this sub-domain by number, ascending, each with the place of another sub-domain that has it.
             let mut shared: Vec<(u64, u32)> = Vec::new();
-            let Opened { mut part, numbers } = mesh.open_part(p)?;
-            while let Some(sharer) =
-                sharers.next_if(|s| s.as_ref().map_or(true, |s| s.part as usize == p))
-            {
-                let sharer = sharer?;
-                shared.push((numbers.of_dense(sharer.local), sharer.other));
+            let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
+            while let Some(sharer) = sharers.next_if(|s| s.part as usize == p)? {
+                shared.push((numbers.dense_vertex(sharer.local), sharer.other));
             }
             shared.sort_unstable();
             let rank = part.id().rank();
@@ -56,7 +52,7 @@ impl Ghosts {
                     let Some(number) = numbers.tet(local) else {
                         continue;
                     };
-                    let nodes = numbers.of(tet.nodes)?;
+                    let nodes = numbers.vertices(tet.nodes)?;
                     others.clear();
                     for v in nodes {
                         let from = shared.partition_point(|s| s.0 < v);
@@ -88,14 +84,7 @@ impl Ghosts {
         }
         let mut counts = vec![0; mesh.n_parts()];
         let path = mesh.dir().join("ghosts");
-        let mut stream = scratch(&path)?;
-        for ghost in sorter.finish()? {
-            let ghost = ghost?;
-            counts[ghost.to as usize] += 1;
-            stream.bytes(&ghost.to_bytes());
-            stream.end()?;
-        }
-        stream.finish()?;
+        save(sorter.finish()?, &path, |ghost: &Ghost| counts[ghost.to as usize] += 1)?;
         let mut firsts = vec![0];
         for count in counts {
             firsts.push(firsts[firsts.len() - 1] + count);
@@ -103,17 +92,13 @@ impl Ghosts {
         Ok(Self { firsts, path })
     }
 
-    /// Those that the partition at place `p` sees, by region and partition. Errors: the disk, those of `each`.
-    pub fn each(&self, p: usize, mut each: impl FnMut(&Ghost) -> Result<()>) -> Result<()> {
-        let mut records = Records::<BYTES>::open(&self.path, self.firsts[p])?;
-        for _ in self.firsts[p]..self.firsts[p + 1] {
-            let Some(record) = records.next()? else { break };
-            each(&Ghost::from_bytes(&record))?;
-        }
-        Ok(())
+    /// Calls `each` with the ghosts of the partition at place `p`, by region and partition. Errors: the disk, those of `each`.
+    pub fn each(&self, p: usize, each: impl FnMut(&Ghost) -> Result<()>) -> Result<()> {
+        let n = self.firsts[p + 1] - self.firsts[p];
+        RecordReader::open(&self.path, self.firsts[p])?.each_of(n, each)
     }
 
-    /// Lists those that the partitions at places `which` see: element, its partition, the one that sees it.
+    /// Lists the ghosts of the partitions at places `which`: element, its partition, the partition that has it as a ghost.
     pub fn write(&self, out: &mut Out, which: &[usize], mesh: &Merged) -> Result<()> {
         let counts = which.iter().map(|&p| self.firsts[p + 1] - self.firsts[p]);
         out.size(counts.sum());

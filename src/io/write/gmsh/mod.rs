@@ -1,8 +1,9 @@
 //! Gmsh 4.1, binary or text, of first or second order: physical surfaces are labels, physical volumes regions.
 //!
-//! Of several sub-domains each is a partition, numbered from 1, whose part of a label or region is an entity of its own below the label's or
-//! region's. Elements are numbered from 1, triangles first; all numbers are those of the whole, also in files of one partition, named
-//! `NAME_1.msh` and so on. The faces between two partitions, each once, lie in both and have no physical group. Each vertex stands with the first entity it is on, surfaces before volumes.
+//! Where there are several sub-domains, each is a partition, numbered from 1. Its part of a label or region is an entity below that of the label
+//! or region. Elements are numbered from 1, triangles first. All numbers are those of the whole, also in files of one partition, named
+//! `NAME_1.msh` and so on. The faces between two partitions are listed once, lie in both and have no physical group. Each vertex belongs to
+//! its first entity, surfaces before volumes.
 //! Source: the Gmsh reference manual, "MSH file format".
 
 mod elements;
@@ -14,23 +15,24 @@ mod piece;
 
 use std::path::{Path, PathBuf};
 
-use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
 use super::midpoints::Midpoints;
+use super::output_files::OutputFiles;
 use super::report::FileCounts;
-use super::selection::Selection;
+use super::selection::ExportSelection;
 use entities::Entities;
+pub(super) use entities::physical_names;
 use ghosts::Ghosts;
 use out::Out;
-use piece::Piece;
+use piece::GmshPiece;
 
-/// Writes one file of all, or one of each partition.
+/// Writes one file of the whole mesh, or one of each partition.
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    (selection, middles): (&Selection, Option<&Midpoints>),
+    (selection, midpoints): (&ExportSelection, Option<&Midpoints>),
 ) -> Result<FileCounts> {
     mesh.expect_passes(1, 1);
     let ghosts = match selection.ghosts {
@@ -41,21 +43,21 @@ pub(super) fn write(
     let foreign = ghosts.filter(|_| selection.pieces);
     if !selection.pieces {
         let all: Vec<usize> = (0..mesh.n_parts()).collect();
-        let piece = Piece { which: &all, middles, foreign };
-        return write_file(mesh, draft, out, &piece, (selection.ascii, ghosts));
+        let piece = GmshPiece { which: &all, midpoints, foreign };
+        return write_file(mesh, outputs, out, &piece, (selection.ascii, ghosts));
     }
     let mut counts = FileCounts::default();
     for (p, part) in mesh.parts().into_iter().enumerate() {
         if selection.writes_piece(part.rank) {
             let path = piece_path(out, part.rank);
-            let piece = Piece { which: &[p], middles, foreign };
-            counts += write_file(mesh, draft, &path, &piece, (selection.ascii, ghosts))?;
+            let piece = GmshPiece { which: &[p], midpoints, foreign };
+            counts += write_file(mesh, outputs, &path, &piece, (selection.ascii, ghosts))?;
         }
     }
     Ok(counts)
 }
 
-/// `NAME_1.msh` of the first sub-domain, as Gmsh itself calls the files of partitions.
+/// `NAME_1.msh` for the first sub-domain: Gmsh's own names for files of partitions.
 fn piece_path(out: &Path, rank: u32) -> PathBuf {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
     let ending = out.extension().unwrap_or_default().to_string_lossy();
@@ -64,18 +66,18 @@ fn piece_path(out: &Path, rank: u32) -> PathBuf {
 
 fn write_file(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     path: &Path,
-    piece: &Piece,
+    piece: &GmshPiece,
     (ascii, ghosts): (bool, Option<&Ghosts>),
 ) -> Result<FileCounts> {
     let entities = Entities::gather(mesh, piece)?;
     let n_tets = entities.n_tets();
     let nodes = nodes::gather(mesh, piece, &entities, path)?;
     let [vertex_bytes, number_bytes] = if ascii { [55, 6] } else { [32, 8] };
-    let numbers = if piece.middles.is_some() { 11 } else { 5 };
+    let numbers = if piece.midpoints.is_some() { 11 } else { 5 };
     let elements_bytes = number_bytes * numbers * (n_tets + entities.n_faces());
-    let file = draft.create(path, 1000 + vertex_bytes * nodes.n + elements_bytes)?;
+    let file = outputs.create(path, 1000 + vertex_bytes * nodes.n + elements_bytes)?;
     let mut out = Out::open(&file, ascii)?;
     out.section("MeshFormat", |out| {
         out.text(if ascii { "4.1 0 8\n" } else { "4.1 1 8\n" });

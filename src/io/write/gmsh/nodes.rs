@@ -1,19 +1,20 @@
-//! Vertices by the entities they stand with.
+//! Vertices by their entities.
 
 use std::path::{Path, PathBuf};
 
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
-use super::super::midpoints::{MiddlePoints, Midpoints};
-use super::super::stream::{Records, scratch};
+use super::super::merged::{Merged, OpenedPart};
+use super::super::midpoints::{ElementEdges, MidpointReader, Midpoints};
+use super::super::stream::{RecordReader, save};
 use super::entities::Entities;
 use super::out::Out;
-use super::piece::Piece;
-use tetdb_base::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
+use super::piece::GmshPiece;
+use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
+use tetdb_store::sealed::BitSet;
 
 sort_record! {
-    /// An entity that a vertex is on, or, behind all of these, where it is.
-    struct Claim {
+    /// An entity that a vertex is on; the last record of a vertex has its position.
+    struct VertexEntity {
         vertex: u64,
         /// [`POSITION`] for a position.
         entity: u32,
@@ -23,7 +24,7 @@ sort_record! {
 
 sort_record! {
     /// A vertex by its entity.
-    struct Node {
+    struct EntityNode {
         entity: u32,
         vertex: u64,
         point: Payload<[f64; 3]>,
@@ -31,164 +32,181 @@ sort_record! {
 }
 
 const POSITION: u32 = u32::MAX;
-const NODE_BYTES: usize = size_of::<<Node as SortRecord>::Bytes>();
 
 /// The vertices of a file, sorted, in a scratch file.
 pub(super) struct Nodes {
     pub n: u64,
-    /// How many stand with each entity, by its place.
+    /// Number of vertices of each entity, by its place.
     counts: Vec<u64>,
     span: [u64; 2],
     path: PathBuf,
 }
 
-/// Numbers that were seen, of a range; those outside are always new.
-struct Seen {
+/// Numbers of a range that were met; numbers outside the range are always new.
+struct MetNumbers {
     first: u64,
-    bits: Vec<u64>,
+    n: u64,
+    met: BitSet,
 }
 
-impl Seen {
+impl MetNumbers {
     fn new(first: u64, n: u64) -> Self {
-        let bits = vec![0; n.div_ceil(64) as usize];
-        Self { first, bits }
+        Self { first, n, met: BitSet::new(n) }
     }
 
     fn is_new(&mut self, number: u64) -> bool {
-        let Some(place) = number.checked_sub(self.first) else {
-            return true;
-        };
-        let (word, bit) = ((place / 64) as usize, 1 << (place % 64));
-        let Some(word) = self.bits.get_mut(word) else {
-            return true;
-        };
-        let is_new = *word & bit == 0;
-        *word |= bit;
-        is_new
+        let place = number.checked_sub(self.first).filter(|&place| place < self.n);
+        place.is_none_or(|place| self.met.insert(place))
     }
 }
 
-/// Gives each vertex of a file, and each middle of an edge, its entity.
+/// Gives an entity to each vertex and each midpoint of a file.
 pub(super) fn gather(
     mesh: &mut Merged,
-    piece: &Piece,
+    piece: &GmshPiece,
     entities: &Entities,
     name: &Path,
 ) -> Result<Nodes> {
     let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
-    let claims = claims(mesh, piece, entities)?;
-    let mut points = piece.middles.map(Midpoints::points).transpose()?;
-    let nodes = granted(claims, mesh.n_vertices(), &mut points, Sorter::new(&dir, bytes))?;
+    let (n_vertices, records) = (mesh.n_vertices(), Sorter::new(&dir, bytes));
+    let mut sorter = EntitySorter { piece, entities, n_vertices, records };
+    sorter.add_faces(mesh)?;
+    let mut edges = piece.midpoints.map(Midpoints::tets).transpose()?;
+    for &p in piece.which {
+        sorter.add_part(mesh, p, &mut edges)?;
+    }
+    sorter.add_ghosts(&mut edges)?;
+    let mut points = piece.midpoints.map(Midpoints::points).transpose()?;
+    let sorted = sorter.records.finish()?;
+    let nodes = first_entities(sorted, n_vertices, &mut points, Sorter::new(&dir, bytes))?;
     let file = name.file_name().unwrap_or_default().to_string_lossy();
-    stored(nodes, entities, dir.join(format!("nodes-{file}")))
+    save_nodes(nodes, entities, dir.join(format!("nodes-{file}")))
 }
 
-/// What faces, tetrahedra and ghosts of the piece say of their vertices and middles, by vertex.
-fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorted<Claim>> {
-    let parts = mesh.parts();
-    let n_vertices = mesh.n_vertices();
-    let mut claims = Sorter::new(mesh.dir(), mesh.sorter_bytes());
-    let mut claim =
-        |vertex, entity, point| claims.push(Claim { vertex, entity, point: Payload(point) });
-    let mut edges = piece.middles.map(Midpoints::faces).transpose()?;
-    let mut number = 0;
-    mesh.faces().each(|face| {
-        if let Some(entity) = entities.surface(face) {
-            for vertex in face.vertices {
-                claim(vertex, entity, [0.0; 3])?;
-            }
-            if let Some(edges) = &mut edges {
-                for edge in edges.of(number)? {
-                    claim(n_vertices + edge, entity, [0.0; 3])?;
+/// Entities of vertices and midpoints being gathered.
+struct EntitySorter<'a> {
+    piece: &'a GmshPiece<'a>,
+    entities: &'a Entities,
+    n_vertices: u64,
+    records: Sorter<VertexEntity>,
+}
+
+impl EntitySorter<'_> {
+    fn push(&mut self, vertex: u64, entity: u32) -> Result<()> {
+        Ok(self.records.push(VertexEntity { vertex, entity, point: Payload([0.0; 3]) })?)
+    }
+
+    fn push_all(&mut self, vertices: impl IntoIterator<Item = u64>, entity: u32) -> Result<()> {
+        vertices.into_iter().try_for_each(|vertex| self.push(vertex, entity))
+    }
+
+    fn push_position(&mut self, vertex: u64, point: [f64; 3]) -> Result<()> {
+        let record = VertexEntity { vertex, entity: POSITION, point: Payload(point) };
+        Ok(self.records.push(record)?)
+    }
+
+    /// Adds the vertices and midpoints of the boundary faces.
+    fn add_faces(&mut self, mesh: &Merged) -> Result<()> {
+        let mut edges = self.piece.midpoints.map(Midpoints::faces).transpose()?;
+        let mut number = 0;
+        mesh.faces().each(|face| {
+            if let Some(entity) = self.entities.surface(face) {
+                self.push_all(face.vertices, entity)?;
+                if let Some(edges) = &mut edges {
+                    let edges = edges.element(number)?;
+                    self.push_all(edges.map(|edge| self.n_vertices + edge), entity)?;
                 }
             }
-        }
-        number += 1;
-        Ok(())
-    })?;
-    let mut edges = piece.middles.map(Midpoints::tets).transpose()?;
-    for &p in piece.which {
-        let Opened { mut part, numbers } = mesh.open_part(p)?;
-        let rank = parts[p].rank;
-        let only = entities.only_volume(rank);
-        // Inside, all tetrahedra around a vertex are of one region, so that the first one tells it.
-        let mut vertices = Seen::new(parts[p].first_vertex, parts[p].n_vertices);
-        let of_edges = piece.middles.map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
-        let mut middles = Seen::new(n_vertices + of_edges.0, of_edges.1);
+            number += 1;
+            Ok(())
+        })
+    }
+
+    /// Adds the vertices of the partition at place `p`, and the midpoints of its tetrahedra.
+    fn add_part(
+        &mut self,
+        mesh: &mut Merged,
+        p: usize,
+        edges: &mut Option<ElementEdges<6>>,
+    ) -> Result<()> {
+        let parts = mesh.parts();
+        let OpenedPart { mut part, numbers } = mesh.open_part(p)?;
+        let only = self.entities.only_volume(parts[p].rank);
+        // All tetrahedra around an inner vertex are of one region, so the first one decides.
+        let mut vertices = MetNumbers::new(parts[p].first_vertex, parts[p].n_vertices);
+        let (first, n) = self.piece.midpoints.map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
+        let mut midpoints = MetNumbers::new(self.n_vertices + first, n);
         let needs_tets = only.is_none() || edges.is_some();
         for tet in part.tets().take_while(|_| needs_tets) {
             let (id, tet) = tet?;
             let Some(number) = numbers.tet(id.local()) else {
                 continue;
             };
-            let entity = entities.volume(tet.region, rank);
-            for v in numbers.of(tet.nodes)? {
-                if vertices.is_new(v) {
-                    claim(v, entity, [0.0; 3])?;
-                }
-            }
-            if let Some(edges) = &mut edges {
-                for v in edges.of(number)?.map(|edge| n_vertices + edge) {
-                    if middles.is_new(v) {
-                        claim(v, entity, [0.0; 3])?;
-                    }
-                }
+            let entity = self.entities.volume(tet.region, parts[p].rank);
+            let corners = numbers.vertices(tet.nodes)?;
+            self.push_all(corners.into_iter().filter(|&v| vertices.is_new(v)), entity)?;
+            if let Some(edges) = edges {
+                let middles = edges.element(number)?.map(|edge| self.n_vertices + edge);
+                self.push_all(middles.into_iter().filter(|&v| midpoints.is_new(v)), entity)?;
             }
         }
         for (v, vertex) in (0u32..).zip(part.vertices()) {
             let vertex = vertex?;
-            let Some(number) = numbers.vertex(v) else {
-                continue;
-            };
-            claim(number, POSITION, vertex.point)?;
-            if let Some(entity) = only {
-                claim(number, entity, [0.0; 3])?;
+            if let Some(number) = numbers.vertex(v) {
+                self.push_position(number, vertex.point)?;
+                if let Some(entity) = only {
+                    self.push(number, entity)?;
+                }
             }
         }
         mesh.advance(parts[p].n_vertices as usize);
-    }
-    piece.each_ghost(|ghost| {
-        let entity = entities.volume(ghost.region, ghost.from);
-        for (v, point) in ghost.nodes.0.into_iter().zip(ghost.points.0.as_chunks::<3>().0) {
-            claim(v, entity, [0.0; 3])?;
-            claim(v, POSITION, *point)?;
-        }
-        if let Some(edges) = &mut edges {
-            for edge in edges.of(ghost.number)? {
-                claim(n_vertices + edge, entity, [0.0; 3])?;
-            }
-        }
         Ok(())
-    })?;
-    Ok(claims.finish()?)
+    }
+
+    /// Adds the vertices and midpoints of the ghosts.
+    fn add_ghosts(&mut self, edges: &mut Option<ElementEdges<6>>) -> Result<()> {
+        let piece = self.piece;
+        piece.each_ghost(|ghost| {
+            let entity = self.entities.volume(ghost.region, ghost.from);
+            self.push_all(ghost.nodes.0, entity)?;
+            for (v, point) in ghost.nodes.0.into_iter().zip(ghost.points.0.as_chunks::<3>().0) {
+                self.push_position(v, *point)?;
+            }
+            if let Some(edges) = edges {
+                let edges = edges.element(ghost.number)?;
+                self.push_all(edges.map(|edge| self.n_vertices + edge), entity)?;
+            }
+            Ok(())
+        })
+    }
 }
 
-/// The first claim of each vertex, which is the strongest, with its position; by entity.
-fn granted(
-    claims: Sorted<Claim>,
+/// The first entity of each vertex, with its position, sorted by entity.
+fn first_entities(
+    records: Sorted<VertexEntity>,
     n_vertices: u64,
-    points: &mut Option<MiddlePoints>,
-    mut sorter: Sorter<Node>,
-) -> Result<Sorted<Node>> {
+    points: &mut Option<MidpointReader>,
+    mut sorter: Sorter<EntityNode>,
+) -> Result<Sorted<EntityNode>> {
     let mut last = None;
-    for claim in claims {
-        let claim = claim?;
+    for record in records {
+        let record = record?;
         match last {
-            Some((vertex, entity)) if vertex == claim.vertex => {
-                if claim.entity == POSITION && entity != POSITION {
-                    sorter.push(Node { entity, vertex, point: claim.point })?;
+            Some((vertex, entity)) if vertex == record.vertex => {
+                if record.entity == POSITION && entity != POSITION {
+                    sorter.push(EntityNode { entity, vertex, point: record.point })?;
                     last = Some((vertex, POSITION));
                 }
             }
             _ => {
-                last = Some((claim.vertex, claim.entity));
-                // Nobody claims the positions of middles: they stand in the order of their numbers.
-                let edge = claim.vertex.checked_sub(n_vertices);
+                last = Some((record.vertex, record.entity));
+                // Midpoints have no record of their position: the positions are in the order of their numbers.
+                let edge = record.vertex.checked_sub(n_vertices);
                 if let (Some(points), Some(edge)) = (&mut *points, edge) {
-                    sorter.push(Node {
-                        entity: claim.entity,
-                        vertex: claim.vertex,
-                        point: Payload(points.of(edge)?),
+                    sorter.push(EntityNode {
+                        entity: record.entity,
+                        vertex: record.vertex,
+                        point: Payload(points.at(edge)?),
                     })?;
                 }
             }
@@ -197,26 +215,22 @@ fn granted(
     Ok(sorter.finish()?)
 }
 
-/// Counts them and puts them into a file at `path`.
-fn stored(sorted: Sorted<Node>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
+/// Counts the vertices and saves them at `path`.
+fn save_nodes(sorted: Sorted<EntityNode>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
     let mut nodes =
         Nodes { n: 0, counts: vec![0; entities.tags().len()], span: [u64::MAX, 0], path };
-    let mut stream = scratch(&nodes.path)?;
-    for node in sorted {
-        let node = node?;
-        nodes.n += 1;
-        nodes.counts[node.entity as usize] += 1;
-        let [least, greatest] = nodes.span;
-        nodes.span = [least.min(node.vertex + 1), greatest.max(node.vertex + 1)];
-        stream.bytes(&node.to_bytes());
-        stream.end()?;
-    }
-    stream.finish()?;
+    let Nodes { n, counts, span: [least, greatest], path } = &mut nodes;
+    save(sorted, path, |node: &EntityNode| {
+        *n += 1;
+        counts[node.entity as usize] += 1;
+        *least = (*least).min(node.vertex + 1);
+        *greatest = (*greatest).max(node.vertex + 1);
+    })?;
     Ok(nodes)
 }
 
 impl Nodes {
-    /// Writes them entity by entity: first the tags of its vertices, then where they are.
+    /// Writes the vertices entity by entity: first their tags, then their positions.
     pub fn write(&self, out: &mut Out, entities: &Entities) -> Result<()> {
         let blocks = self.counts.iter().filter(|&&n| n > 0).count() as u64;
         for n in [blocks, self.n, self.span[0], self.span[1]] {
@@ -233,24 +247,15 @@ impl Nodes {
             }
             out.size(n);
             out.end()?;
-            self.each(first, n, |node| {
+            RecordReader::open(&self.path, first)?.each_of(n, |node: &EntityNode| {
                 out.size(node.vertex + 1);
                 out.end()
             })?;
-            self.each(first, n, |node| {
+            RecordReader::open(&self.path, first)?.each_of(n, |node: &EntityNode| {
                 node.point.0.into_iter().for_each(|x| out.double(x));
                 out.end()
             })?;
             first += n;
-        }
-        Ok(())
-    }
-
-    fn each(&self, first: u64, n: u64, mut each: impl FnMut(Node) -> Result<()>) -> Result<()> {
-        let mut records = Records::<NODE_BYTES>::open(&self.path, first)?;
-        for _ in 0..n {
-            let Some(record) = records.next()? else { break };
-            each(Node::from_bytes(&record))?;
         }
         Ok(())
     }

@@ -29,7 +29,7 @@ impl Out {
     ) -> Result<()> {
         self.text(&format!("${name}\n"));
         fill(self)?;
-        // What reads bytes passes over white space before the mark.
+        // Readers of binary sections skip white space before the mark.
         let break_line = if self.ascii { "" } else { "\n" };
         self.text(&format!("{break_line}$End{name}\n"));
         Ok(())

@@ -20,16 +20,11 @@ pub(super) fn element(
 
 /// Numbers on a line.
 pub(super) fn list(stream: &mut Stream, numbers: &[u64]) -> Result<()> {
-    for (i, &number) in numbers.iter().enumerate() {
-        let is_last = i + 1 == numbers.len();
-        stream.integer(number, if is_last { b'\n' } else { b' ' });
-    }
+    stream.integers(numbers.iter().copied(), b' ', b'\n');
     stream.end()
 }
 
-pub(super) fn point(stream: &mut Stream, [x, y, z]: [f64; 3]) -> Result<()> {
-    stream.double(x, b' ');
-    stream.double(y, b' ');
-    stream.double(z, b'\n');
+pub(super) fn point(stream: &mut Stream, point: [f64; 3]) -> Result<()> {
+    stream.doubles(point, b' ', b'\n');
     stream.end()
 }

@@ -1,7 +1,7 @@
 //! MFEM 1.3: the whole as one file, or `NAME.000000` and so on, one for each process of MPI.
 //!
 //! Attributes are regions, boundary attributes label + 1; both have their names as sets. Faces between two filled regions are boundary elements
-//! too, as MFEM allows. A part is a mesh of its own with the numbers of the store, followed by what it shares with others (`shared`).
+//! too, as MFEM allows. A part is a mesh of its own with the numbers of the store, followed by the entities it shares with others (`shared`).
 //! Source: MFEM's documentation, "Mesh formats"; the sections of parallel meshes as `ParMesh` prints and reads them.
 
 mod lines;
@@ -10,30 +10,30 @@ mod shared;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::draft::Draft;
 use super::error::Result;
-use super::merged::{Merged, Opened};
+use super::merged::{Merged, OpenedPart};
 use super::names::quotable;
+use super::output_files::OutputFiles;
 use super::report::FileCounts;
-use super::selection::Selection;
+use super::selection::ExportSelection;
 use super::stream::Stream;
 use lines::{TETRAHEDRON, TRIANGLE, element, point};
 use shared::Shared;
 use tetdb_schema::record::{NO_TET, SealedFacet};
 use tetdb_store::sealed::Subdomain;
 
-/// Writes one file of all, or one of each sub-domain.
+/// Writes one file of the whole mesh, or one of each sub-domain.
 pub(super) fn write(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
-    selection: &Selection,
+    selection: &ExportSelection,
 ) -> Result<FileCounts> {
     mesh.check_limits(out, i32::MAX as u64)?;
     mesh.expect_passes(1, 1);
     let sets = [region_sets(mesh)?, label_sets(mesh)];
     if !selection.pieces {
-        return write_serial(mesh, draft, out, &sets);
+        return write_serial(mesh, outputs, out, &sets);
     }
     let mut shared = Shared::gather(mesh)?;
     let mut counts = FileCounts::default();
@@ -44,8 +44,8 @@ pub(super) fn write(
         let mut opened = mesh.open_part(p)?;
         let stem = out.file_stem().unwrap_or_default().to_string_lossy();
         let path = out.with_file_name(format!("{stem}.{:06}", row.rank));
-        let fin_first = mesh.fin_first();
-        let written = write_part((&mut opened, fin_first), draft, &path, &sets, |stream| {
+        let support_first = mesh.support_first();
+        let written = write_part((&mut opened, support_first), outputs, &path, &sets, |stream| {
             shared.write(p as u32, stream)
         })?;
         mesh.advance((written.vertices + written.tets) as usize);
@@ -56,13 +56,13 @@ pub(super) fn write(
 
 fn write_serial(
     mesh: &mut Merged,
-    draft: &mut Draft,
+    outputs: &mut OutputFiles,
     out: &Path,
     sets: &[String; 2],
 ) -> Result<FileCounts> {
     let counts =
         FileCounts { vertices: mesh.n_vertices(), tets: mesh.n_tets(), triangles: mesh.n_faces() };
-    let mut stream = begin(draft, out, counts)?;
+    let mut stream = begin(outputs, out, counts)?;
     mesh.tets(|tet| element(&mut stream, tet.region.into(), TETRAHEDRON, &tet.nodes))?;
     boundary(&mut stream, counts.triangles, sets);
     mesh.faces().each(|face| {
@@ -76,10 +76,10 @@ fn write_serial(
     Ok(counts)
 }
 
-/// A sub-domain; `end` writes what follows the mesh.
+/// Writes a sub-domain; `end` writes the sections after the mesh.
 fn write_part(
-    (opened, fin_first): (&mut Opened, u64),
-    draft: &mut Draft,
+    (opened, support_first): (&mut OpenedPart, u64),
+    outputs: &mut OutputFiles,
     out: &Path,
     sets: &[String; 2],
     end: impl FnOnce(&mut Stream) -> Result<()>,
@@ -88,16 +88,16 @@ fn write_part(
     let counts = FileCounts {
         vertices: part.row().vertices,
         tets: part.row().tets,
-        triangles: each_facet(part, fin_first, |_| Ok(()))?,
+        triangles: each_facet(part, support_first, |_| Ok(()))?,
     };
-    let mut stream = begin(draft, out, counts)?;
+    let mut stream = begin(outputs, out, counts)?;
     for tet in part.tets() {
         let tet = tet?.1;
         let nodes = tet.nodes.map(u64::from);
         element(&mut stream, tet.region.into(), TETRAHEDRON, &nodes)?;
     }
     boundary(&mut stream, counts.triangles, sets);
-    each_facet(part, fin_first, |facet| {
+    each_facet(part, support_first, |facet| {
         let nodes = outward(facet.vertices.map(u64::from), facet.regions);
         element(&mut stream, u64::from(facet.label) + 1, TRIANGLE, &nodes)
     })?;
@@ -112,17 +112,17 @@ fn write_part(
     Ok(counts)
 }
 
-/// The input triangles that are this sub-domain's to list: those whose filled side, or front where both are filled, is here. Returns how many.
+/// Calls `each` with the input triangles whose filled side, or front where both are filled, is in this sub-domain. Returns their number.
 fn each_facet(
     part: &mut Subdomain,
-    fin_first: u64,
+    support_first: u64,
     mut each: impl FnMut(&SealedFacet) -> Result<()>,
 ) -> Result<u64> {
     let mut n = 0;
     for facet in part.facets() {
         let facet = facet?;
         let is_here = facet.tets[usize::from(facet.regions[0] == 0)] != NO_TET;
-        if is_here && facet.triangle < fin_first {
+        if is_here && facet.triangle < support_first {
             each(&facet)?;
             n += 1;
         }
@@ -130,15 +130,15 @@ fn each_facet(
     Ok(n)
 }
 
-/// The vertices counter-clockwise seen from outside the tetrahedron that the face is of: the one in front, where there is one.
+/// The vertices counter-clockwise seen from outside the tetrahedron in front, or behind where the front is empty.
 fn outward([a, b, c]: [u64; 3], regions: [u32; 2]) -> [u64; 3] {
     if regions[0] == 0 { [a, b, c] } else { [a, c, b] }
 }
 
-fn begin(draft: &mut Draft, out: &Path, counts: FileCounts) -> Result<Stream> {
+fn begin(outputs: &mut OutputFiles, out: &Path, counts: FileCounts) -> Result<Stream> {
     let digits = u64::from(counts.vertices.max(1).ilog10());
     let elements = (4 * digits + 9) * counts.tets + (3 * digits + 8) * counts.triangles;
-    let path = draft.create(out, 48 * counts.vertices + elements)?;
+    let path = outputs.create(out, 48 * counts.vertices + elements)?;
     let mut stream = Stream::open(&path)?;
     let n = counts.tets;
     stream.text(&format!("MFEM mesh v1.3\n\ndimension\n3\n\nelements\n{n}\n"));
@@ -163,7 +163,7 @@ fn label_sets(mesh: &Merged) -> String {
     sets(labels.map(|(label, name)| (label + 1, name)))
 }
 
-/// Named sets of attributes; what has the same name is one set.
+/// Named sets of attributes; attributes of one name are one set.
 fn sets(named: impl Iterator<Item = (u32, String)>) -> String {
     let mut by_name = BTreeMap::<String, Vec<String>>::new();
     for (attribute, name) in named {

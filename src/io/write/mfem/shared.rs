@@ -1,33 +1,33 @@
-//! Vertices, edges and faces that several sub-domains have, in groups by who has them.
+//! Vertices, edges and faces that several sub-domains have, in groups by these sub-domains.
 //!
-//! What is shared lies on the boundary of each that has it: the corners, edges and faces of input triangles and interface faces, sorted by the
-//! numbers of their vertices in the whole, meet those of the others. So every side lists them alike, and begins each edge and face at the same
-//! vertex.
+//! Shared entities lie on the boundary of each of their sub-domains. The corners, edges and faces of input triangles and interface faces are
+//! sorted by the numbers of their vertices in the whole, so that equal ones meet. Every side lists them in this order, and begins each edge and
+//! face at the same vertex.
 
 use std::collections::BTreeMap;
-use std::iter::Peekable;
 
 use super::super::error::Result;
-use super::super::merged::{Merged, Opened};
+use super::super::merged::{Merged, OpenedPart};
 use super::super::stream::Stream;
 use super::lines::{TRIANGLE, list};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_schema::record::NO_TET;
+use tetdb_store::sealed::MergeReader;
 
 sort_record! {
     /// A vertex, an edge or a face on the boundary of a sub-domain.
     struct Entity {
-        /// Numbers of its vertices in the whole, ascending, the last one as often as it takes.
+        /// Numbers of its vertices in the whole, ascending; the last one is repeated to fill three places.
         key: [u64; 3],
         part: u32,
-        /// The same in the sub-domain.
+        /// Numbers of the vertices in the sub-domain, parallel to `key`.
         locals: [u32; 3],
     }
 }
 
 sort_record! {
-    /// One that is shared, as one of those that have it lists it.
-    struct Member {
+    /// A shared entity as one of its sub-domains lists it.
+    struct SharedMember {
         part: u32,
         group: u32,
         /// Vertices less one.
@@ -37,13 +37,13 @@ sort_record! {
     }
 }
 
-/// Those on the boundaries of all sub-domains, each as often as one has it, equal ones together.
+/// The entities on the boundaries of all sub-domains, equal ones next to each other.
 fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
     let mut entities = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     for p in 0..mesh.n_parts() {
-        let Opened { mut part, numbers, .. } = mesh.open_part(p)?;
+        let OpenedPart { mut part, numbers, .. } = mesh.open_part(p)?;
         let mut push = |face: [u32; 3]| -> Result<()> {
-            let [i, j, k] = numbers.of(face)?;
+            let [i, j, k] = numbers.vertices(face)?;
             let mut ends = [(i, face[0]), (j, face[1]), (k, face[2])];
             ends.sort_unstable();
             let [a, b, c] = ends;
@@ -69,9 +69,9 @@ fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
     Ok(entities.finish()?)
 }
 
-/// All that is shared.
+/// All shared entities.
 pub(super) struct Shared {
-    members: Peekable<Sorted<Member>>,
+    members: MergeReader<SharedMember>,
     /// Places of the sub-domains of each group.
     groups: Vec<Vec<u32>>,
     /// Vertices, edges and faces of each sub-domain's groups.
@@ -79,48 +79,39 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    /// Finds it. Errors: damage, the disk.
+    /// Finds the shared entities. Errors: damage, the disk.
     pub fn gather(mesh: &mut Merged) -> Result<Self> {
-        let mut entities = entities(mesh)?.peekable();
+        let (mut entities, mut all) = (MergeReader::new(entities(mesh)?), Vec::new());
         let mut members = Sorter::new(mesh.dir(), mesh.sorter_bytes());
         let mut group_of = BTreeMap::new();
         let mut counts = BTreeMap::<_, [u64; 3]>::new();
-        while let Some(first) = entities.next() {
-            let first = first?;
-            let mut all = vec![first];
-            while let Some(next) =
-                entities.next_if(|e| e.as_ref().map_or(true, |e| e.key == first.key))
-            {
-                let next = next?;
-                if all.last() != Some(&next) {
-                    all.push(next);
-                }
-            }
+        while entities.next_group(&mut all, |a, b| a.key == b.key)? {
+            all.dedup();
             if all.len() == 1 {
                 continue;
             }
             let ranks: Vec<u32> = all.iter().map(|e| e.part).collect();
             let n = group_of.len() as u32;
             let group = *group_of.entry(ranks).or_insert(n);
-            let [a, b, c] = first.key;
+            let [a, b, c] = all[0].key;
             let dimension = u32::from(a != b) + u32::from(b != c);
-            for Entity { key, part, locals } in all {
+            for &Entity { key, part, locals } in &all {
                 counts.entry((part, group)).or_default()[dimension as usize] += 1;
-                members.push(Member { part, group, dimension, key, locals })?;
+                members.push(SharedMember { part, group, dimension, key, locals })?;
             }
         }
         let mut groups = vec![Vec::new(); group_of.len()];
         for (ranks, group) in group_of {
             groups[group as usize] = ranks;
         }
-        let members = members.finish()?.peekable();
+        let members = MergeReader::new(members.finish()?);
         Ok(Self { members, groups, counts })
     }
 
-    /// Writes what the sub-domain at place `p` shares; later calls are for later ones. Errors: the disk.
+    /// Writes the shared entities of the sub-domain at place `p`; later calls are for later sub-domains. Errors: the disk.
     pub fn write(&mut self, p: u32, stream: &mut Stream) -> Result<()> {
         let groups: Vec<_> = self.counts.range((p, 0)..(p + 1, 0)).collect();
-        // The first group is what the sub-domain has alone.
+        // The first group is the sub-domain alone.
         stream.text(&format!(
             "\ncommunication_groups\nnumber_of_groups {}\n\n1 {p}\n",
             groups.len() + 1
@@ -139,11 +130,8 @@ impl Shared {
             for (dimension, what) in (0..).zip(["vertices", "edges", "faces"]) {
                 stream.text(&format!("\nshared_{what} {}\n", counts[dimension as usize]));
                 let here = (p, group, dimension);
-                let order = |m: &Member| (m.part, m.group, m.dimension);
-                while let Some(member) =
-                    self.members.next_if(|m| m.as_ref().map_or(true, |m| order(m) <= here))
-                {
-                    let member = member?;
+                let order = |m: &SharedMember| (m.part, m.group, m.dimension);
+                while let Some(member) = self.members.next_if(|m| order(m) <= here)? {
                     if order(&member) < here {
                         continue; // of a sub-domain that is not written
                     }

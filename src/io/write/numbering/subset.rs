@@ -1,16 +1,16 @@
-//! Which of a sub-domain's tetrahedra and vertices are written when only some regions are.
+//! The tetrahedra of some regions in a sub-domain, and their vertices: two sets of numbers.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::error::Result;
-use super::stream::{Records, scratch};
-use tetdb_store::sealed::Subdomain;
+use crate::write::error::Result;
+use crate::write::stream::{RecordReader, scratch};
+use tetdb_store::sealed::{BitSet, Subdomain};
 
-/// A set of numbers that knows how many of them are below each number.
+/// A set of numbers, with the count of members below each.
 ///
-/// Shape: a bit for each number, and for each 64 of them how many there are before. Memory: 1.5 bits for each number.
-pub(super) struct RankedSet {
+/// Shape: a bit for each number, and a count for each 64 numbers. Memory: 1.5 bits for each number.
+pub(in crate::write) struct RankedSet {
     words: Vec<u64>,
     before: Vec<u32>,
 }
@@ -26,11 +26,7 @@ impl RankedSet {
         Self { words, before }
     }
 
-    fn len(&self) -> u64 {
-        self.words.iter().map(|w| u64::from(w.count_ones())).sum()
-    }
-
-    /// How many members are below `number`, if it is one.
+    /// Number of members below `number`; `None` where it is no member.
     #[inline]
     pub fn rank(&self, number: u32) -> Option<u32> {
         let (place, bit) = (number as usize / 64, number % 64);
@@ -40,18 +36,17 @@ impl RankedSet {
     }
 }
 
-/// Those of one sub-domain: the tetrahedra of some regions and their vertices.
-pub(super) struct Chosen {
+/// The tetrahedra of some regions in one sub-domain, and their vertices.
+pub(in crate::write) struct Subset {
     pub tets: RankedSet,
     pub vertices: RankedSet,
 }
 
-impl Chosen {
-    /// Finds them, in one pass, and keeps them at `path`; returns how many tetrahedra and vertices. Errors: damage, the disk.
+impl Subset {
+    /// Finds the subset in one pass and saves it at `path`; returns the numbers of tetrahedra and vertices. Errors: damage, the disk.
     pub fn gather(part: &mut Subdomain, regions: &BTreeSet<u32>, path: &Path) -> Result<[u64; 2]> {
-        let words = |n: u64| vec![0u64; n.div_ceil(64) as usize];
-        let (mut tets, mut vertices) = (words(part.row().tets), words(part.row().vertices));
         let n_vertices = part.row().vertices;
+        let (mut tets, mut vertices) = (BitSet::new(part.row().tets), BitSet::new(n_vertices));
         for chunk in 0..part.tet_summaries().len() {
             let [least, greatest] = part.tet_summaries()[chunk].regions;
             if regions.range(least..=greatest).next().is_none() {
@@ -60,32 +55,31 @@ impl Chosen {
             let chunk = part.tet_chunk(chunk as u32)?;
             for (local, tet) in (chunk.first..).zip(&chunk.records) {
                 if regions.contains(&tet.region) {
-                    tets[local as usize / 64] |= 1 << (local % 64);
+                    tets.insert(local.into());
                     for v in tet.nodes {
                         if u64::from(v) >= n_vertices {
                             part.corner(v)?;
                         }
-                        vertices[v as usize / 64] |= 1 << (v % 64);
+                        vertices.insert(v.into());
                     }
                 }
             }
         }
         let mut stream = scratch(path)?;
-        for word in tets.iter().chain(&vertices) {
-            stream.bytes(&word.to_le_bytes());
-            stream.end()?;
+        for word in tets.words().iter().chain(vertices.words()) {
+            stream.record(&word.to_le_bytes())?;
         }
         stream.finish()?;
-        Ok([tets, vertices].map(|words| RankedSet::new(words).len()))
+        Ok([tets, vertices].map(|set| set.words().iter().map(|w| u64::from(w.count_ones())).sum()))
     }
 
-    /// Those of a sub-domain with `n` tetrahedra, kept at `path`. Errors: the disk.
+    /// Loads the subset of a sub-domain with `n` tetrahedra from `path`. Errors: the disk.
     pub fn load(path: &Path, n: u64) -> Result<Self> {
-        let mut records = Records::<8>::open(path, 0)?;
         let mut words = Vec::new();
-        while let Some(word) = records.next()? {
-            words.push(u64::from_le_bytes(word));
-        }
+        RecordReader::open(path, 0)?.each(|word| {
+            words.push(u64::from_le_bytes(*word));
+            Ok(())
+        })?;
         let vertices = words.split_off(n.div_ceil(64) as usize);
         Ok(Self { tets: RankedSet::new(words), vertices: RankedSet::new(vertices) })
     }
@@ -103,7 +97,6 @@ mod tests {
             words[n as usize / 64] |= 1 << (n % 64);
         }
         let set = RankedSet::new(words);
-        assert_eq!(set.len(), members.len() as u64);
         for n in 0..600 {
             let expected = members.iter().position(|&m| m == n);
             assert_eq!(set.rank(n), expected.map(|i| i as u32));

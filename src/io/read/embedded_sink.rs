@@ -1,11 +1,11 @@
-//! Where readers of edges and points put them.
+//! The target of readers of edges and points.
 
 use std::collections::HashMap;
 
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{EmbeddedSet, SurfaceError};
 
-/// What is wanted of a file that may have both.
+/// The kind of elements to read from a file that may have both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WireKind {
     /// Edges: `.obj`, `.vtk`, `.poly`.
@@ -16,16 +16,16 @@ pub enum WireKind {
 
 /// Edges or points being read.
 #[derive(Default)]
-pub(super) struct WireSink {
+pub(super) struct EmbeddedSink {
     pub set: EmbeddedSet,
-    /// What is called by no name of its own is called so.
+    /// Name of elements without a name of their own.
     stem: String,
     labels: HashMap<String, u32>,
     bytes_max: u64,
 }
 
-impl WireSink {
-    /// For a file of this name, and at most so many bytes.
+impl EmbeddedSink {
+    /// A target for a file of this name, of at most so many bytes.
     pub fn called(stem: String, bytes_max: u64) -> Self {
         Self { stem, bytes_max, ..Self::default() }
     }

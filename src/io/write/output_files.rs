@@ -1,4 +1,4 @@
-//! Files in the making: a folder beside the output, removed whatever happens; rename when all are whole.
+//! Files being written: a folder beside the output, which is always removed; the files are renamed when all are complete.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -12,20 +12,20 @@ use super::error::{Result, WriteError};
 /// The name that stands for standard output.
 pub(super) const STDOUT: &str = "-";
 
-/// Numbers drafts within the process.
+/// Numbers the folders of the process.
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
 /// A hidden folder beside the output that holds unfinished files and scratch.
 ///
-/// Invariant: what it holds counts for nobody until [`Draft::publish`]; dropped, it leaves nothing.
-pub(super) struct Draft {
+/// Invariant: no file has its name before [`OutputFiles::publish`]; dropping removes the folder.
+pub(super) struct OutputFiles {
     dir: PathBuf,
-    /// Unfinished files and where they belong.
+    /// Unfinished files and their final paths.
     files: Vec<(PathBuf, PathBuf)>,
 }
 
-impl Draft {
-    /// Makes the folder for `out`. Errors: its place does not exist or may not be written.
+impl OutputFiles {
+    /// Creates the folder for `out`. Errors: the parent folder does not exist or is not writable.
     pub fn new(out: &Path) -> Result<Self> {
         let name = out.file_name().unwrap_or_default().to_string_lossy();
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
@@ -50,9 +50,9 @@ impl Draft {
         &self.dir
     }
 
-    /// A new file that will become `out`, expected to need `bytes`; standard output is itself.
+    /// Creates a file that will become `out` and needs about `bytes`; for standard output returns `out`.
     ///
-    /// Errors: less than that is free; the file cannot be created.
+    /// Errors: less disk is free; the file cannot be created.
     pub fn create(&mut self, out: &Path, bytes: u64) -> Result<PathBuf> {
         if out == Path::new(STDOUT) {
             return Ok(out.to_owned());
@@ -66,9 +66,9 @@ impl Draft {
         Ok(path)
     }
 
-    /// Syncs all files, then renames them into place. Returns places and lengths.
+    /// Syncs all files, then renames them into place; returns paths and lengths.
     ///
-    /// Errors: the disk. Of several files those that are there go first, so that no moment has some of an old mesh and some of this one.
+    /// Existing files of an output of several are removed first, so that old and new ones never mix. Errors: the disk.
     pub fn publish(self) -> Result<Vec<(PathBuf, u64)>> {
         let mut done = Vec::new();
         for (path, out) in &self.files {
@@ -86,7 +86,7 @@ impl Draft {
                 }
             }
         }
-        // Nothing between the renames: a kill finds all files there or none, but for the moment that these take.
+        // No other work between the renames, so that a kill rarely finds only some of the files.
         let folders: BTreeSet<&Path> = self.files.iter().map(|(_, out)| folder(out)).collect();
         for folder in &folders {
             fs::create_dir_all(folder).map_err(|e| WriteError::io(folder, e))?;
@@ -102,15 +102,22 @@ impl Draft {
     }
 }
 
-impl Drop for Draft {
+impl OutputFiles {
+    /// Publishes the one file; returns its length. Errors: as [`OutputFiles::publish`].
+    pub fn publish_one(self) -> Result<u64> {
+        Ok(self.publish()?.iter().map(|(_, bytes)| bytes).sum())
+    }
+}
+
+impl Drop for OutputFiles {
     fn drop(&mut self) {
-        // Nothing depends on it; a folder that stays is only untidy.
+        // A folder that cannot be removed is only untidy.
         let _ = fs::remove_dir_all(&self.dir);
     }
 }
 
-/// Removes folders that writers of the same file left on this machine when they were killed, also one of `new`'s name: the system gives
-/// numbers of processes again. Nothing depends on it: what cannot be removed stays.
+/// Removes folders that killed writers of the same file left on this machine, also one of `new`'s name, because systems reuse process numbers.
+/// A folder that cannot be removed stays.
 fn remove_abandoned(name: &str, new: &Path) {
     let is_abandoned = |path: &Path| {
         let file_name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -3,27 +3,27 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use tetdb_schema::catalog::WiresRow;
-use tetdb_schema::ids::{Owner, VertexId};
 
 use super::error::Result;
 use super::numbering::{Numbering, Source};
 use tetdb_base::storage::StorageError;
+use tetdb_store::sealed::input_index;
 use tetdb_store::store::Catalog;
 
 /// A point of the merged mesh.
 #[derive(Clone, Copy)]
-pub(super) struct WirePoint {
+pub(super) struct EmbeddedPoint {
     /// Number of its vertex.
     pub vertex: u64,
     pub label: u32,
     pub point: [f64; 3],
 }
 
-/// Bytes for each edge and point while they are gathered: two vertices in two tables, and itself.
+/// Bytes for each edge or point while it is gathered: two vertices in two tables, and the edge itself.
 const BYTES_EACH: u64 = 256;
 
-/// What is left of `memory` beside the embedded edges and points of a store. Errors: less than these take.
-pub(super) fn beside(row: &WiresRow, memory: usize) -> Result<usize> {
+/// Returns the bytes of `memory` beside the embedded edges and points of a store. Errors: these do not fit.
+pub(super) fn memory_left(row: &WiresRow, memory: usize) -> Result<usize> {
     let needed = BYTES_EACH * (row.edges.len() + row.points.len()) as u64;
     let left = (memory as u64).checked_sub(needed);
     let left = left.ok_or(StorageError::Budget {
@@ -34,17 +34,17 @@ pub(super) fn beside(row: &WiresRow, memory: usize) -> Result<usize> {
     Ok(left as usize)
 }
 
-/// What of the edges and points is in what is written.
+/// Embedded edges and points that are written.
 #[derive(Clone, Default)]
-pub(super) struct WrittenWires {
-    /// Numbers of the vertices of each edge, and its label, by which they are sorted.
+pub(super) struct WrittenEmbedded {
+    /// Numbers of the vertices of each edge, and its label; sorted by label.
     pub edges: Vec<([u64; 2], u32)>,
-    /// By label.
-    pub points: Vec<WirePoint>,
+    /// Sorted by label.
+    pub points: Vec<EmbeddedPoint>,
 }
 
-impl WrittenWires {
-    /// Those whose vertices are written. Errors: damage, the disk.
+impl WrittenEmbedded {
+    /// Gathers the edges and points whose vertices are written. Errors: damage, the disk.
     pub fn gather(
         store: &mut Catalog,
         row: &WiresRow,
@@ -60,12 +60,8 @@ impl WrittenWires {
             let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
             for (local, vertex) in (0u32..).zip(part.vertices()) {
                 let vertex = vertex?;
-                let Some(VertexId { owner: Owner::Surface, index }) =
-                    VertexId::from_number(vertex.id)
-                else {
-                    continue;
-                };
-                if let (true, Some(number)) = (wanted.contains(&index), numbers.vertex(local)) {
+                let index = input_index(vertex.id).filter(|index| wanted.contains(index));
+                if let (Some(index), Some(number)) = (index, numbers.vertex(local)) {
                     known.insert(index, (number, vertex.point));
                 }
             }
@@ -78,7 +74,7 @@ impl WrittenWires {
         let mut points: Vec<_> = (row.points.iter())
             .filter_map(|&[v, label]| {
                 let &(vertex, point) = known.get(&v)?;
-                Some(WirePoint { vertex, label, point })
+                Some(EmbeddedPoint { vertex, label, point })
             })
             .collect();
         points.sort_by_key(|point| point.label);
@@ -94,12 +90,12 @@ impl WrittenWires {
         EdgesToFind(self.edges.iter().map(|(ends, _)| (ascending(*ends), false)).collect())
     }
 
-    /// Keeps the edges that were found: where not all is written, both ends may be and the edge not.
+    /// Keeps the edges that were found. Where only a part is written, an edge may be missing and both its ends not.
     pub fn keep_found(&mut self, edges: &EdgesToFind) {
         self.edges.retain(|(ends, _)| edges.0[&ascending(*ends)]);
     }
 
-    /// How many edges each label has.
+    /// Number of edges of each label.
     pub fn edge_labels(&self) -> BTreeMap<u32, u64> {
         let mut labels = BTreeMap::new();
         for (_, label) in &self.edges {
@@ -108,7 +104,7 @@ impl WrittenWires {
         labels
     }
 
-    /// How many points each label has.
+    /// Number of points of each label.
     pub fn point_labels(&self) -> BTreeMap<u32, u64> {
         let mut labels = BTreeMap::new();
         for point in &self.points {
@@ -118,7 +114,7 @@ impl WrittenWires {
     }
 }
 
-/// Whether each edge is one of a tetrahedron, by its vertices in ascending order.
+/// Embedded edges by their vertices in ascending order; true for those that a tetrahedron has.
 pub(super) struct EdgesToFind(HashMap<[u64; 2], bool>);
 
 impl EdgesToFind {

@@ -2,26 +2,25 @@
 
 use std::path::Path;
 
-use super::error::{FilePlace, ReadError, Spot};
+use super::embedded_sink::{EmbeddedSink, WireKind};
+use super::error::{FilePlace, ReadFault};
 use super::feed::{Feed, Result, name, parse};
 use super::open::{Reader, open, stem, unpacked_name};
-use super::wire_sink::{WireKind, WireSink};
 use super::{obj, tetgen, vtk};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::EmbeddedSet;
 
-/// Reads the edges or the points of a file, labels after its groups or markers, else after the file. `cap`: bytes of memory it may take.
+/// Reads the edges or the points of a file; labels are its groups or markers, else the name of the file. `cap`: bytes of memory allowed.
 ///
 /// # Errors
-/// The first [`ReadError`] with its place; a file without any is one.
+/// The first [`ReadError`](super::ReadError) with its place; a file without any is one.
 pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<EmbeddedSet> {
     let mut feed = open(path, cap / 4)?;
-    let file = feed.file().to_owned();
-    let mut sink = WireSink::called(stem(path), cap / 4);
+    let mut sink = EmbeddedSink::called(stem(path), cap / 4);
     let named = unpacked_name(path);
     let extension = named.extension().unwrap_or_default().to_string_lossy();
     match (extension.to_ascii_lowercase().as_str(), kind) {
-        ("obj", _) => obj::read_wires(feed, kind, &mut sink)?,
+        ("obj", _) => obj::read_embedded(feed, kind, &mut sink)?,
         ("vtk", _) => vtk::read(feed, kind, &mut sink)?,
         ("poly", WireKind::Edges) => {
             let nodes = named.with_extension("node");
@@ -30,32 +29,25 @@ pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<EmbeddedSet> 
         ("node", WireKind::Points) => tetgen::read_nodes(&mut feed, &mut sink)?,
         ("csv" | "txt" | "xyz", WireKind::Points) => read_table(&mut feed, &mut sink)?,
         _ => {
-            return Err(ReadError::UnknownFormat {
-                place: FilePlace::of_file(path),
-                help: "edges are read from .obj, .vtk and .poly, points from .csv, .node, .obj and .vtk",
-            });
+            let help =
+                "edges are read from .obj, .vtk and .poly, points from .csv, .node, .obj and .vtk";
+            return Err(FilePlace::new(path).refuse(ReadFault::UnknownFormat(help)));
         }
     }
     let set = sink.set;
-    let is_empty = match kind {
-        WireKind::Edges => set.edges.is_empty(),
-        WireKind::Points => set.marks.is_empty(),
+    let (is_empty, expected) = match kind {
+        WireKind::Edges => (set.edges.is_empty(), "edges"),
+        WireKind::Points => (set.marks.is_empty(), "points"),
     };
-    match is_empty {
-        true => Err(ReadError::Unexpected {
-            place: FilePlace { file, spot: Spot::Totals },
-            expected: match kind {
-                WireKind::Edges => "edges".to_owned(),
-                WireKind::Points => "points".to_owned(),
-            },
-            found: "none".to_owned(),
-        }),
-        false => Ok(set),
+    if !is_empty {
+        return Ok(set);
     }
+    let (expected, found) = (expected.to_owned(), "none".to_owned());
+    Err(FilePlace::new(path).refuse(ReadFault::Unexpected { expected, found }))
 }
 
 /// Lines of three numbers, and a name behind them; between them commas, semicolons or blanks. A first line of words is a heading.
-fn read_table(feed: &mut Feed<Reader>, sink: &mut WireSink) -> Result<()> {
+fn read_table(feed: &mut Feed<Reader>, sink: &mut EmbeddedSink) -> Result<()> {
     let mut line = Vec::new();
     let mut is_first = true;
     loop {

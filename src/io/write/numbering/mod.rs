@@ -1,24 +1,30 @@
-//! Dense numbers of vertices over all sub-domains, with shared vertices counted once.
+//! Dense numbers of what is written: vertices over all sub-domains, with shared vertices counted once.
 //!
-//! A shared vertex has the same id in each sub-domain and is numbered where its rank is lowest.
-//! Four external sorts of the few vertices that can be shared: by id (who shares), by place (the number
-//! where it is numbered), by group (carried over to the others), by place again (a table per sub-domain).
+//! A shared vertex has the same id in each of its sub-domains, and the sub-domain of lowest rank numbers it. Four external sorts treat the
+//! few vertices that can be shared: by id (the sub-domains that share one), by place (its number), by group (its number for the others), by
+//! place again (a table for each sub-domain). `subset` numbers some tetrahedra of a sub-domain and their vertices, `corners` the vertices
+//! of chosen elements.
+
+mod corners;
+mod subset;
 
 use std::path::{Path, PathBuf};
+
+pub(super) use corners::{CornerSorter, DenseCorners};
+pub(super) use subset::Subset;
 
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 
-use super::chosen::Chosen;
 use super::error::Result;
-use super::stream::{Records, scratch};
-use tetdb_base::storage::{SortRecord, Sorted, Sorter, sort_record};
-use tetdb_store::sealed::SealedError;
-use tetdb_store::store::{Catalog, StoreError};
+use super::stream::{RecordReader, save};
+use tetdb_base::storage::{Sorted, Sorter, sort_record};
+use tetdb_store::sealed::{MergeReader, SealedError};
+use tetdb_store::store::Catalog;
 
 sort_record! {
     /// A vertex that another sub-domain may also have.
-    pub(super) struct Candidate {
+    pub(super) struct ShareableVertex {
         pub id: u64,
         /// Place in the list of parts.
         pub part: u32,
@@ -32,7 +38,7 @@ sort_record! {
     struct SharedVertex {
         part: u32,
         local: u32,
-        /// The same for all parts that have it.
+        /// Equal for all parts that have the vertex.
         group: u64,
         /// Another part numbers it.
         is_elsewhere: bool,
@@ -43,7 +49,7 @@ sort_record! {
     /// A group's number, or a part that needs it.
     struct GroupMember {
         group: u64,
-        /// Not the one that numbers it, which comes first.
+        /// False for the part that numbers the group, which comes first.
         is_elsewhere: bool,
         part: u32,
         local: u32,
@@ -61,37 +67,35 @@ sort_record! {
     }
 }
 
-/// Bytes of an entry in the scratch file.
-const ENTRY: usize = size_of::<<TableEntry as SortRecord>::Bytes>();
-
 /// A sub-domain of which all or some is written.
 #[derive(Clone)]
 pub(super) struct Source {
     pub row: SubdomainRow,
-    /// What is written of it.
+    /// Tetrahedra and vertices that are written.
     pub n_tets: u64,
     pub n_vertices: u64,
-    /// Where it stands which these are, unless it is all.
-    pub chosen: Option<PathBuf>,
+    /// Scratch file of the subset, unless all is written.
+    pub subset: Option<PathBuf>,
 }
 
 impl Source {
-    pub fn chosen(&self) -> Result<Option<Chosen>> {
-        let load = |path| Chosen::load(path, self.row.tets);
-        self.chosen.as_deref().map(load).transpose()
+    /// The written subset; `None` stands for all. Errors: the disk.
+    pub fn subset(&self) -> Result<Option<Subset>> {
+        let load = |path| Subset::load(path, self.row.tets);
+        self.subset.as_deref().map(load).transpose()
     }
 }
 
 impl From<SubdomainRow> for Source {
     fn from(row: SubdomainRow) -> Self {
-        Self { n_tets: row.tets, n_vertices: row.vertices, row, chosen: None }
+        Self { n_tets: row.tets, n_vertices: row.vertices, row, subset: None }
     }
 }
 
 /// Numbers of all vertices.
 ///
-/// Shape: `firsts[p]` = number of the first own vertex of part `p`, `shared[p]` = how many of its
-/// vertices an earlier part numbers; parts are sub-domains by rank. Where not all of a sub-domain is written, what is counts densely.
+/// Shape: `firsts[p]` = number of the first own vertex of part `p`, `shared[p]` = number of its vertices that
+/// an earlier part numbers; parts are sub-domains by rank. Vertices that are not written have no number.
 pub(super) struct Numbering {
     firsts: Vec<u64>,
     shared: Vec<u64>,
@@ -103,7 +107,7 @@ pub(super) struct Numbering {
 ///
 /// Shape: `locals`, ascending, are numbered elsewhere, as `numbers[i]`; all others follow `first`.
 pub(super) struct PartNumbers {
-    /// Its file and sub-domain.
+    /// File and rank of the sub-domain.
     place: (PathBuf, u32),
     first: u64,
     locals: Vec<u32>,
@@ -111,34 +115,34 @@ pub(super) struct PartNumbers {
     n_locals: u32,
     /// Number of the first tetrahedron.
     pub first_tet: u64,
-    /// What is written, unless it is all.
-    chosen: Option<Chosen>,
+    /// The written subset; `None` stands for all.
+    subset: Option<Subset>,
 }
 
 impl PartNumbers {
-    /// The number of vertex `local`; one that is not written has none.
+    /// The number of vertex `local`; `None` where it is not written.
     #[inline]
     pub fn vertex(&self, local: u32) -> Option<u64> {
-        match &self.chosen {
-            None if local < self.n_locals => Some(self.of_dense(local)),
+        match &self.subset {
+            None if local < self.n_locals => Some(self.dense_vertex(local)),
             None => None,
-            Some(chosen) => Some(self.of_dense(chosen.vertices.rank(local)?)),
+            Some(subset) => Some(self.dense_vertex(subset.vertices.rank(local)?)),
         }
     }
 
-    /// The number of tetrahedron `local`; one that is not written has none.
+    /// The number of tetrahedron `local`; `None` where it is not written.
     #[inline]
     pub fn tet(&self, local: u32) -> Option<u64> {
-        let dense = match &self.chosen {
+        let dense = match &self.subset {
             None => local,
-            Some(chosen) => chosen.tets.rank(local)?,
+            Some(subset) => subset.tets.rank(local)?,
         };
         Some(self.first_tet + u64::from(dense))
     }
 
-    /// The numbers of the vertices of a record that is written, so that they are too. Errors: damage; the record names others.
+    /// The numbers of the vertices of a record that is written. Errors: damage, where the record names a vertex that is not written.
     #[inline]
-    pub fn of<const N: usize>(&self, locals: [u32; N]) -> Result<[u64; N]> {
+    pub fn vertices<const N: usize>(&self, locals: [u32; N]) -> Result<[u64; N]> {
         let mut numbers = [0; N];
         for (number, local) in numbers.iter_mut().zip(locals) {
             *number = self.vertex(local).ok_or_else(|| self.names(&locals))?;
@@ -148,17 +152,13 @@ impl PartNumbers {
 
     #[cold]
     fn names(&self, locals: &[u32]) -> SealedError {
-        let (path, subdomain) = self.place.clone();
-        SealedError::Content {
-            path,
-            subdomain,
-            what: format!("a record names vertices {locals:?}"),
-        }
+        let (path, subdomain) = &self.place;
+        SealedError::content(path, *subdomain, format!("a record names vertices {locals:?}"))
     }
 
     /// The number of a vertex that has this number among those of the part that are written.
     #[inline]
-    pub fn of_dense(&self, local: u32) -> u64 {
+    pub fn dense_vertex(&self, local: u32) -> u64 {
         if self.locals.is_empty() {
             return self.first + u64::from(local);
         }
@@ -176,7 +176,7 @@ impl PartNumbers {
 }
 
 impl Numbering {
-    /// Numbers the vertices of all sub-domains. With `apart`, each has all of its own.
+    /// Numbers the vertices of all sub-domains; with `apart`, each sub-domain numbers all of its own.
     ///
     /// Holds about `memory` bytes. Errors: damage, the disk.
     pub fn new(
@@ -194,7 +194,7 @@ impl Numbering {
         };
         let mut places = Sorter::new(dir, memory as u64 / 4);
         if parts.len() > 1 && !apart {
-            let by_id = candidates(store, parts, dir, memory)?;
+            let by_id = shareable_vertices(store, parts, dir, memory)?;
             numbering.group(store, parts, by_id, &mut places)?;
         }
         for (part, shared) in parts.iter().zip(&numbering.shared) {
@@ -211,28 +211,24 @@ impl Numbering {
         &mut self,
         store: &mut Catalog,
         parts: &[Source],
-        by_id: Sorted<Candidate>,
+        by_id: Sorted<ShareableVertex>,
         places: &mut Sorter<SharedVertex>,
     ) -> Result<()> {
-        let mut owner: Option<(Candidate, bool)> = None;
-        let mut group = 0u64;
-        for candidate in by_id {
-            let candidate = candidate?;
-            match &mut owner {
-                Some((first, several)) if first.id == candidate.id => {
-                    if candidate.part == first.part {
-                        let rank = parts[candidate.part as usize].row.rank;
-                        return Err(twice(store, rank, candidate.id));
-                    }
-                    if !*several {
-                        *several = true;
-                        group += 1;
-                        places.push(first.shared(group, false))?;
-                    }
-                    places.push(candidate.shared(group, true))?;
-                    self.shared[candidate.part as usize] += 1;
+        let (mut by_id, mut same, mut group) = (MergeReader::new(by_id), Vec::new(), 0);
+        while by_id.next_group(&mut same, |a, b| a.id == b.id)? {
+            let [first, others @ ..] = &same[..] else { continue };
+            if others.is_empty() {
+                continue;
+            }
+            group += 1;
+            places.push(first.shared(group, false))?;
+            for other in others {
+                if other.part == first.part {
+                    let rank = parts[other.part as usize].row.rank;
+                    return Err(twice(store, rank, other.id));
                 }
-                _ => owner = Some((candidate, false)),
+                places.push(other.shared(group, true))?;
+                self.shared[other.part as usize] += 1;
             }
         }
         Ok(())
@@ -279,7 +275,7 @@ impl Numbering {
         self.n_vertices
     }
 
-    /// The numbers of part `p` of `parts` of `store`. Memory: 12 bytes per vertex that another part numbers, and `Chosen` where that is not all.
+    /// The numbers of part `p` of `parts` of `store`. Memory: 12 bytes per vertex that another part numbers, and the [`Subset`].
     ///
     /// Errors: the disk.
     pub fn part(&self, store: &Catalog, parts: &[Source], p: usize) -> Result<PartNumbers> {
@@ -293,33 +289,31 @@ impl Numbering {
             numbers: Vec::with_capacity(n),
             n_locals: row.vertices as u32,
             first_tet: parts[..p].iter().map(|part| part.n_tets).sum(),
-            chosen: parts[p].chosen()?,
+            subset: parts[p].subset()?,
         };
         if n > 0 {
             let before = self.shared[..p].iter().sum();
-            let mut entries = Records::<ENTRY>::open(&self.table, before)?;
-            while part.locals.len() < n {
-                let Some(entry) = entries.next()? else { break };
-                let entry = TableEntry::from_bytes(&entry);
+            RecordReader::open(&self.table, before)?.each_of(n as u64, |entry: &TableEntry| {
                 part.locals.push(entry.local);
                 part.numbers.push(entry.number);
-            }
+                Ok(())
+            })?;
         }
         Ok(part)
     }
 }
 
-/// All vertices that are written and that another sub-domain may also have.
-pub(super) fn candidates(
+/// All vertices that are written and that another sub-domain may also have, by id.
+pub(super) fn shareable_vertices(
     store: &mut Catalog,
     parts: &[Source],
     dir: &Path,
     memory: usize,
-) -> Result<Sorted<Candidate>> {
+) -> Result<Sorted<ShareableVertex>> {
     let mut sorter = Sorter::new(dir, memory as u64 / 4);
     for (p, source) in (0u32..).zip(parts) {
         let rank = source.row.rank;
-        let chosen = source.chosen()?;
+        let subset = source.subset()?;
         let mut part = store.open_subdomain(rank, memory / 4)?;
         let own = SubdomainId::new(rank).map(Owner::Subdomain);
         for (local, vertex) in (0u32..).zip(part.vertices()) {
@@ -327,12 +321,12 @@ pub(super) fn candidates(
             if VertexId::from_number(id).map(|v| v.owner) == own {
                 continue;
             }
-            let dense = match &chosen {
+            let dense = match &subset {
                 None => Some(local),
-                Some(chosen) => chosen.vertices.rank(local),
+                Some(subset) => subset.vertices.rank(local),
             };
             if let Some(local) = dense {
-                sorter.push(Candidate { id, part: p, local })?;
+                sorter.push(ShareableVertex { id, part: p, local })?;
             }
         }
     }
@@ -348,32 +342,33 @@ sort_record! {
     }
 }
 
-/// Every vertex that several parts have, for each of these and each other one.
-pub(super) fn sharers(by_id: Sorted<Candidate>, dir: &Path, bytes: u64) -> Result<Sorted<Sharer>> {
+/// Every vertex that several parts have, once for each ordered pair of these.
+pub(super) fn sharers(
+    by_id: Sorted<ShareableVertex>,
+    dir: &Path,
+    bytes: u64,
+) -> Result<Sorted<Sharer>> {
     let mut sorter = Sorter::new(dir, bytes);
-    let mut group: Vec<Candidate> = Vec::new();
-    for candidate in by_id {
-        let candidate = candidate?;
-        if group.first().is_some_and(|first| first.id != candidate.id) {
-            group.clear();
-        }
-        for other in &group {
-            for [a, b] in [[&candidate, other], [other, &candidate]] {
-                sorter.push(Sharer { part: a.part, local: a.local, other: b.part })?;
+    let (mut by_id, mut group) = (MergeReader::new(by_id), Vec::new());
+    while by_id.next_group(&mut group, |a, b| a.id == b.id)? {
+        for (i, a) in group.iter().enumerate() {
+            for b in &group[i + 1..] {
+                for [one, other] in [[a, b], [b, a]] {
+                    sorter.push(Sharer { part: one.part, local: one.local, other: other.part })?;
+                }
             }
         }
-        group.push(candidate);
     }
     Ok(sorter.finish()?)
 }
 
-impl Candidate {
+impl ShareableVertex {
     fn shared(&self, group: u64, is_elsewhere: bool) -> SharedVertex {
         SharedVertex { part: self.part, local: self.local, group, is_elsewhere }
     }
 }
 
-/// Carries each group's number to the parts that share it, and writes the tables one after the other.
+/// Gives each group's number to its other parts, and writes the tables of all parts one after the other.
 fn carry(groups: Sorted<GroupMember>, dir: &Path, memory: usize, table: &Path) -> Result<()> {
     let mut sorter = Sorter::new(dir, memory as u64 / 4);
     let mut number = 0;
@@ -385,21 +380,12 @@ fn carry(groups: Sorted<GroupMember>, dir: &Path, memory: usize, table: &Path) -
         }
         sorter.push(TableEntry { part: member.part, local: member.local, number })?;
     }
-    let mut stream = scratch(table)?;
-    for entry in sorter.finish()? {
-        stream.bytes(&entry?.to_bytes());
-        stream.end()?;
-    }
-    stream.finish()
+    save(sorter.finish()?, table, |_| ())
 }
 
 fn twice(store: &mut Catalog, rank: u32, id: u64) -> super::WriteError {
-    StoreError::Sealed(SealedError::Content {
-        path: store.dir().to_owned(),
-        subdomain: rank,
-        what: format!("two vertices have the id {id}"),
-    })
-    .into()
+    let what = format!("two vertices have the id {id}");
+    SealedError::content(store.dir(), rank, what).into()
 }
 
 #[cfg(test)]
@@ -415,10 +401,10 @@ mod tests {
             numbers: vec![4],
             n_locals: 4,
             first_tet: 0,
-            chosen: None,
+            subset: None,
         };
-        assert_eq!(numbers.of([0, 1, 2, 3]).unwrap(), [10, 4, 11, 12]);
-        let error = numbers.of([0, 4, 2]).unwrap_err();
+        assert_eq!(numbers.vertices([0, 1, 2, 3]).unwrap(), [10, 4, 11, 12]);
+        let error = numbers.vertices([0, 4, 2]).unwrap_err();
         assert_eq!(error.code(), "damaged");
         let text = error.to_string();
         assert!(text.contains("a.redb") && text.contains("[0, 4, 2]"), "{text}");

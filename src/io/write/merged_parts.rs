@@ -1,0 +1,80 @@
+//! Preparations of the merged mesh: its sub-domains, their boundary faces and required faces.
+
+use std::path::Path;
+
+use super::error::Result;
+use super::faces::{FaceSorter, FaceSource};
+use super::numbering::{Source, Subset};
+use super::scope::{FaceSet, Scope};
+use tetdb_base::storage::check_cancelled;
+use tetdb_schema::record::NO_TET;
+use tetdb_store::sealed::{FaceJoin, FaceJoinSorter, SealedError, Subdomain};
+use tetdb_store::store::Catalog;
+
+/// The sub-domains in `scope` and their written subsets; a sub-domain without written tetrahedra is left out.
+pub(super) fn sources(
+    store: &mut Catalog,
+    scope: Scope,
+    dir: &Path,
+    memory: usize,
+) -> Result<Vec<Source>> {
+    let mut sources = Vec::new();
+    for row in store.subdomains()? {
+        if !scope.holds(row.rank) {
+            continue;
+        }
+        let mut source = Source::from(row);
+        if !scope.regions.is_empty() {
+            let path = dir.join(format!("subset-{}", source.row.rank));
+            let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
+            [source.n_tets, source.n_vertices] = Subset::gather(&mut part, scope.regions, &path)?;
+            source.subset = Some(path);
+        }
+        if source.n_tets > 0 || scope.regions.is_empty() {
+            sources.push(source);
+        }
+    }
+    Ok(sources)
+}
+
+/// Gathers the faces of a sub-domain's tetrahedra that are required: input triangles, and support triangles of embedded edges. Errors: damage, the disk.
+pub(super) fn required_faces(part: &mut Subdomain, dir: &Path, memory: u64) -> Result<FaceJoin> {
+    let mut sorter = FaceJoinSorter::new(dir, memory);
+    for facet in part.facets() {
+        check_cancelled();
+        let facet = facet?;
+        for tet in facet.tets.into_iter().filter(|&tet| tet != NO_TET) {
+            sorter.push(tet, facet.vertices, false, 0)?;
+        }
+    }
+    Ok(sorter.finish()?)
+}
+
+pub(super) fn misplaced(part: &Subdomain, found: u32, expected: u32) -> SealedError {
+    part.damaged(format!("tetrahedron {found} stands where {expected} was expected"))
+}
+
+/// Adds the faces of a sub-domain that its scope lists to `sorter`. Interface faces are labelled by the sub-domain behind
+/// them, from `first_label` on. Facets from `support_first` on are no triangles of the input.
+pub(super) fn collect_faces(
+    from: &mut Subdomain,
+    part: &FaceSource,
+    [first_label, support_first]: [u64; 2],
+    sorter: &mut FaceSorter,
+) -> Result<()> {
+    if part.scope.faces != FaceSet::Interfaces {
+        for facet in from.facets() {
+            let facet = facet?;
+            if facet.triangle < support_first {
+                sorter.push(&facet, part)?;
+            }
+        }
+    }
+    for face in from.interfaces() {
+        let face = face?;
+        if part.scope.lists(part.rank, face.other) {
+            sorter.push_interface(&face, first_label as u32 + face.other, part)?;
+        }
+    }
+    Ok(())
+}
