@@ -162,7 +162,10 @@ pub struct SubdomainRow {
     pub bytes: u64,
 }
 
-/// A file of the store that counts.
+const SUBDOMAIN: &str = "subdomain";
+const COARSE: &str = "coarse";
+
+/// A file of the store that counts: the working or sealed mesh of a sub-domain in one generation.
 #[derive(
     Archive,
     Serialize,
@@ -181,6 +184,57 @@ pub struct FileRow {
     pub subdomain: u32,
     /// Generation in the name of the file.
     pub generation: u32,
+}
+
+impl FileRow {
+    /// Name of the file of a sub-domain.
+    pub fn subdomain_name(self) -> String {
+        self.name(SUBDOMAIN)
+    }
+
+    /// Name of the file of a coarse snapshot.
+    pub fn coarse_name(self) -> String {
+        self.name(COARSE)
+    }
+
+    /// The inverse of [`FileRow::subdomain_name`].
+    pub fn from_subdomain_name(name: &str) -> Option<Self> {
+        Self::from_name(SUBDOMAIN, name)
+    }
+
+    /// The inverse of [`FileRow::coarse_name`].
+    pub fn from_coarse_name(name: &str) -> Option<Self> {
+        Self::from_name(COARSE, name)
+    }
+
+    fn name(self, prefix: &str) -> String {
+        format!("{prefix}-{:05}-g{}.redb", self.subdomain, self.generation)
+    }
+
+    fn from_name(prefix: &str, name: &str) -> Option<Self> {
+        let (subdomain, generation) = name
+            .strip_prefix(prefix)?
+            .strip_prefix('-')?
+            .strip_suffix(".redb")?
+            .split_once("-g")?;
+        let file =
+            Self { subdomain: subdomain.parse().ok()?, generation: generation.parse().ok()? };
+        (file.name(prefix) == name).then_some(file)
+    }
+}
+
+impl SubdomainRow {
+    /// Its file.
+    pub const fn file(&self) -> FileRow {
+        FileRow { subdomain: self.rank, generation: self.generation }
+    }
+}
+
+impl CoarseRow {
+    /// Its file.
+    pub const fn file(&self) -> FileRow {
+        FileRow { subdomain: self.rank, generation: self.generation }
+    }
 }
 
 /// A coarse snapshot: the working mesh a sub-domain was meshed from, kept.

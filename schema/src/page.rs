@@ -35,7 +35,25 @@ const _: () = assert!(size_of::<Slot>() == 32 && align_of::<Slot>() == 4);
 const _: () = assert!(FRAME_BYTES == 65_536 && STORED_BYTES == 65_504);
 const _: () = assert!(STORED_BYTES + 16 <= 65_536);
 
-/// What a page holds.
+/// Position of record `id` when the slots without records are left out.
+#[inline]
+pub const fn dense(id: u32) -> u32 {
+    (id >> SLOT_BITS) * RECORDS as u32 + (id & SLOT_MASK)
+}
+
+/// The id at position `n`; inverse of [`dense`].
+#[inline]
+pub const fn sparse(n: u32) -> u32 {
+    (n / RECORDS as u32) << SLOT_BITS | n % RECORDS as u32
+}
+
+/// The id after `id`.
+#[inline]
+pub const fn next_id(id: u32) -> u32 {
+    if (id & SLOT_MASK) as usize == RECORDS - 1 { id + 3 } else { id + 1 }
+}
+
+/// The records of a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 #[non_exhaustive]
@@ -188,6 +206,19 @@ pub fn access_page(bytes: &[u8]) -> Result<&StoredPage, rkyv::rancor::Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn unused_slots_are_never_ids() {
+        for n in [0, 1, 2045, 2046, 4091, 4092, 100_000] {
+            assert_eq!(dense(sparse(n)), n);
+            assert!((sparse(n) & SLOT_MASK) < RECORDS as u32);
+        }
+        let mut id = 0;
+        for n in 0..10_000 {
+            assert_eq!(id, sparse(n));
+            id = next_id(id);
+        }
+    }
 
     #[test]
     fn a_page_comes_back_and_any_flipped_bit_is_found() {

@@ -11,8 +11,8 @@ use std::path::Path;
 use redb::{ReadOnlyDatabase, ReadableDatabase, TableDefinition};
 use tetdb_schema::chunk::{ChunkAddress, ChunkKind, Decoder};
 use tetdb_schema::digest::{Digest, vertex_mix};
-use tetdb_schema::leaf::{PageDecoder, PageRecord};
 use tetdb_schema::record::{SealedTet, SealedVertex};
+use tetdb_schema::unsealed::{PageDecoder, PageRecord};
 
 /// The only table of every file.
 const PAGES: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
@@ -97,7 +97,7 @@ fn records<R: PageRecord>(
         pages.open::<R>(page, value.value())?;
         if let Some(beside) = beside {
             let value = table.get(beside)?.ok_or("attributes are missing")?;
-            pages.open_beside::<R>(page, value.value())?;
+            pages.open_extra::<R>(page, value.value())?;
         }
         pages.records(page, &mut chunk)?;
         all.append(&mut chunk);

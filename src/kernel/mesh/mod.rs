@@ -6,7 +6,6 @@ mod faces;
 mod renumber;
 mod scan;
 mod snapshot;
-mod state;
 mod trial;
 mod vertices;
 
@@ -15,6 +14,7 @@ pub use cursor::Mesh;
 pub use faces::{Facet, InterfaceFace, SHEET};
 pub use renumber::{Workspace, renumber};
 pub use scan::{Scan, scan_parts, tets_of_page};
-pub use state::{MESH_STATE_WORDS, MeshState, dense, next_id, sparse};
+pub use tetdb_schema::page::{dense, next_id, sparse};
+pub use tetdb_schema::tree::MeshState;
 pub use trial::{Draft, Foreseen, Trial, look_ahead};
 pub use vertices::{End, VertexTag};

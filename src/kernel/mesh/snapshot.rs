@@ -6,8 +6,8 @@ use tetdb_schema::record::{self, CoarseFace, CoarseTet, CoarseVertex};
 
 use super::anatomy::{MARK, REQUIRED, VERTEX_MASK};
 use super::cursor::Mesh;
-use super::state::{dense, sparse};
 use super::{FaceRef, Facet, InterfaceFace, Tet, Workspace};
+use super::{dense, sparse};
 use tetdb_base::geom::orient;
 use tetdb_base::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
 

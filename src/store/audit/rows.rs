@@ -11,9 +11,10 @@ use tetdb_schema::digest::Digest;
 use tetdb_schema::record::SealedTet;
 
 use super::{Finding, Offender, Report};
-use crate::sealed::{Corner, RegionTotals, Subdomain, Totals};
+use crate::sealed::{Corner, Subdomain, Totals};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
+use tetdb_schema::totals::RegionTotals;
 
 /// Of one sub-domain.
 pub(super) struct Rederived {

@@ -23,7 +23,6 @@ pub use face_pairs::{FacePairs, Paired, face_of, sorted_face};
 pub use form::Form;
 pub use shape::{Shape, quality_bin};
 pub use subdomain::{Chunk, Chunks, Subdomain};
-pub use totals::RegionTotals;
 pub use totals::Totals;
 pub use vertex_cache::{Corner, VertexCache};
-pub use writer::{InterfaceSide, Sealed, SealedWriter};
+pub use writer::{Sealed, SealedWriter};

@@ -14,7 +14,6 @@ use tetdb_schema::chunk::{
     ChunkAddress, ChunkKind, ChunkRecord, Decoder, HEAD_BYTES, RangeSummary, TetSummary,
     VertexSummary,
 };
-use tetdb_schema::leaf::{PageDecoder, PageRecord, beside_page};
 use tetdb_schema::page::{
     FORMAT_VERSION, Frame, PageAddress, PageKind, SLOTS, STORED_BYTES, access_page, open_page,
     seal_full_page, seal_page,
@@ -23,6 +22,7 @@ use tetdb_schema::record::{
     CoarseFace, CoarseTet, CoarseVertex, Facet, InterfaceFace, SealedFacet, SealedTet,
     SealedVertex, Tet, TetAttribute, Vertex,
 };
+use tetdb_schema::unsealed::{PageDecoder, PageRecord, extra_page};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// A target and the folder of its corpus.
@@ -183,7 +183,7 @@ fn leaf_records<R: PageRecord>(bytes: &[u8]) {
     let count = bytes.iter().take(2).fold(0, |n, &b| n << 8 | u32::from(b)) % 2100;
     let mut content = bytes.get(2..).unwrap_or_default().to_vec();
     content.resize(2 * STORED_BYTES, 0);
-    let (main, beside) = content.split_at(STORED_BYTES);
+    let (main, extra) = content.split_at(STORED_BYTES);
     let sealed = |kind: PageKind, page: u32, content: &[u8]| {
         let mut frame: Box<Frame> = Box::new([Default::default(); SLOTS]);
         bytemuck::cast_slice_mut(&mut frame[..SLOTS - 1]).copy_from_slice(content);
@@ -193,9 +193,9 @@ fn leaf_records<R: PageRecord>(bytes: &[u8]) {
     };
     let opened = decoder.open::<R>(PAGE, &sealed(R::PAGE, PAGE, main));
     assert_eq!(opened, Ok(()));
-    if let Some(kind) = R::BESIDE {
-        let value = sealed(kind, beside_page(PAGE), beside);
-        assert_eq!(decoder.open_beside::<R>(PAGE, &value), Ok(()));
+    if let Some(kind) = R::EXTRA {
+        let value = sealed(kind, extra_page(PAGE), extra);
+        assert_eq!(decoder.open_extra::<R>(PAGE, &value), Ok(()));
     }
     let mut records: Vec<R> = Vec::new();
     let first = decoder.records(PAGE, &mut records);

@@ -6,9 +6,9 @@
 //! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
 
 use tetdb_schema::ids::{Owner, VertexId};
-use tetdb_schema::leaf::TetPlace;
 use tetdb_schema::page::{NONE, RECORDS};
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
+use tetdb_schema::unsealed::TetLinks;
 
 use super::neighbors::Neighbors;
 use super::records::{Claim, RequiredFace, TetRecord};
@@ -160,7 +160,7 @@ fn tets(
                 let (vertices, odd) = sorted_face(FACES[i].map(|k| record.nodes[k]));
                 faces.push(RequiredFace { vertices, tet: t, odd })?;
             }
-            let place = TetPlace {
+            let place = TetLinks {
                 neighbors: match neighbors {
                     Some(neighbors) => neighbors.next()?,
                     None => [NONE; 4],

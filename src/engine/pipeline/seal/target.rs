@@ -6,7 +6,7 @@ use tetdb_schema::ids::SubdomainId;
 
 use tetdb_base::geom::Aabb;
 use tetdb_base::storage::DiskPath;
-use tetdb_kernel::topology::FacesAcross;
+use tetdb_schema::topology::FacesAcross;
 use tetdb_store::sealed::Form;
 
 /// Where and how to seal.

@@ -7,8 +7,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::{DiskPath, Pages, StorageError, attempt};
 use tetdb_kernel::mesh::{FaceRef, Mesh};
-use tetdb_kernel::topology::FacesAcross;
 use tetdb_schema::page::{RECORDS, SLOT_MASK};
+use tetdb_schema::topology::FacesAcross;
 use tetdb_store::sealed::SealedError;
 
 /// Does `work`. Errors: its own; damage, when it panics and what `open` opens, which it began with, is no mesh. Other panics are bugs and

@@ -4,8 +4,6 @@ use std::collections::BTreeMap;
 
 use super::common::Common;
 use super::cut::CutJob;
-use super::order::{CutOrder, Order, SubdomainOrder};
-use super::receipt::{CutReceipt, Receipt};
 use super::subdomain::SubdomainJob;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Plan;
@@ -13,6 +11,7 @@ use crate::pipeline::progress::Watcher;
 use crate::pipeline::tree::DONE;
 use tetdb_base::storage::DiskPath;
 use tetdb_kernel::bisect::CutReport;
+use tetdb_schema::work::{CutOrder, CutReceipt, Order, Receipt, SubdomainOrder};
 use tetdb_store::store::{Catalog, StoreError};
 
 /// Where a worker finds files and leaves new ones.
@@ -80,12 +79,12 @@ impl Worker<'_> {
         share: Plan,
         watch: &Watcher,
     ) -> Result<(CutReceipt, CutReport), PipelineError> {
-        let (parent, cut) = (order.parent, order.parent.part.cut());
-        let written = (parent.part.children()).map(|part| {
+        let (parent, cut) = (order.parent, order.parent.ranks.cut());
+        let written = (parent.ranks.children()).map(|part| {
             let name = Catalog::file_name(part.first, parent.generation + DONE);
             self.place.output.join(name)
         });
-        let base = Catalog::file_name(parent.part.first, parent.generation);
+        let base = Catalog::file_name(parent.ranks.first, parent.generation);
         let job = CutJob {
             order,
             base: self.place.input(base),
@@ -105,12 +104,12 @@ impl Worker<'_> {
         order: SubdomainOrder,
         share: Plan,
     ) -> Result<SubdomainJob, PipelineError> {
-        let SubdomainOrder { part, zones, owners } = order;
-        let (rank, coarse) = (part.part.first, part.generation);
+        let SubdomainOrder { mesh, zones, owners } = order;
+        let (rank, coarse) = (mesh.ranks.first, mesh.generation);
         let output = |name: String| self.place.output.join(name);
         let kept = Catalog::coarse_name(rank, coarse);
         Ok(SubdomainJob {
-            part,
+            mesh,
             base: self.place.input(Catalog::file_name(rank, coarse)),
             sealed: output(Catalog::file_name(rank, coarse + DONE)),
             generation: coarse + DONE,
