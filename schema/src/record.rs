@@ -33,7 +33,7 @@ pub struct Vertex {
 }
 
 /// A facet of a working page.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Facet {
     /// Vertex ids in the order of the input triangle.
     pub vertices: [u32; 3],
@@ -189,7 +189,7 @@ pub mod tag {
 }
 
 /// A vertex of a sealed sub-domain; its number is its place.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct SealedVertex {
     /// Position.
     pub point: [f64; 3],
@@ -209,7 +209,7 @@ impl SealedVertex {
 }
 
 /// An input triangle that appears in a sealed sub-domain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct SealedFacet {
     /// Vertex numbers in the sub-domain, in the order of the input triangle.
     pub vertices: [u32; 3],
@@ -224,7 +224,7 @@ pub struct SealedFacet {
 }
 
 /// A face of a sealed sub-domain shared with another one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct InterfaceFace {
     /// Vertex numbers in this sub-domain, counter-clockwise seen from outside it.
     pub vertices: [u32; 3],

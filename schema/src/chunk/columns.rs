@@ -50,12 +50,6 @@ impl Columns {
         self.bytes.push(v as u8);
     }
 
-    /// A column of varints.
-    #[inline]
-    pub fn varints32(&mut self, values: impl Iterator<Item = u32>) {
-        values.for_each(|v| self.varint(u64::from(v)));
-    }
-
     /// Bytes as they are.
     pub fn raw(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);

@@ -4,17 +4,14 @@
 //! A decoder meets whatever a disk returns: it answers damage with an error, never with a panic, and
 //! allocates nothing that the head's checked count does not justify.
 
-mod coarse;
 mod codec;
+mod column;
 mod columns;
-mod facets;
 mod packer;
-mod steps;
+mod records;
 mod summaries;
 #[cfg(test)]
 mod tests;
-mod tets;
-mod vertices;
 
 pub use codec::{Decoder, Encoder};
 pub use columns::{Columns, Malformed};
