@@ -20,7 +20,7 @@ pub enum Blob {
     SubdomainCount,
     /// Six f64: low and high corner of the box around the surface.
     Bounds,
-    /// [`SubtreeMesh`](crate::tree::SubtreeMesh) of the subtree whose first rank this is; only until it is sealed.
+    /// [`SubtreeMesh`](crate::tree::SubtreeMesh) of the subtree with this first rank. It stays when the sub-domain is sealed.
     Subtree(u32),
     /// Four f64 of [`CutPlane`](crate::tree::CutPlane), by cut.
     CutPlane(u32),

@@ -28,7 +28,7 @@ const HEADER_SLOT: usize = RECORDS;
 pub type Slot = [u32_le; 8];
 /// A whole frame.
 pub type Frame = [Slot; SLOTS];
-/// What is stored of a frame.
+/// The stored slots of a frame.
 pub type StoredPage = [Slot; SLOTS - 1];
 
 const _: () = assert!(size_of::<Slot>() == 32 && align_of::<Slot>() == 4);
@@ -44,7 +44,7 @@ pub const fn dense(id: u32) -> u32 {
 /// The id at position `n`; inverse of [`dense`].
 #[inline]
 pub const fn sparse(n: u32) -> u32 {
-    (n / RECORDS as u32) << SLOT_BITS | n % RECORDS as u32
+    ((n / RECORDS as u32) << SLOT_BITS) | (n % RECORDS as u32)
 }
 
 /// The id after `id`.
@@ -53,7 +53,7 @@ pub const fn next_id(id: u32) -> u32 {
     if (id & SLOT_MASK) as usize == RECORDS - 1 { id + 3 } else { id + 1 }
 }
 
-/// The records of a page.
+/// The kind of records in a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 #[non_exhaustive]
@@ -84,7 +84,7 @@ pub const fn page_key(kind: PageKind, page: u32) -> u64 {
 /// Where a page belongs; a page found anywhere else is damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PageAddress {
-    /// What it holds.
+    /// Kind of its records.
     pub kind: PageKind,
     /// Rank of the sub-domain.
     pub subdomain: u32,
@@ -92,7 +92,7 @@ pub struct PageAddress {
     pub page: u32,
 }
 
-/// A stored page is not what it should be.
+/// A damaged page, or a page of another place.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum PageError {
@@ -133,7 +133,7 @@ pub fn seal_page(frame: &mut [Slot], address: PageAddress, generation: u32) {
     seal_full_page(frame, address, generation, 0);
 }
 
-/// The same for a page whose first `count` slots hold records, which its header says.
+/// Writes the header of a frame whose first `count` slots hold records, with that count.
 pub fn seal_full_page(frame: &mut [Slot], address: PageAddress, generation: u32, count: u32) {
     let version_kind = u32::from(FORMAT_VERSION) | (address.kind as u32) << 16;
     let words = [0, 0, MAGIC, version_kind, address.subdomain, address.page, generation, count];
@@ -191,7 +191,7 @@ pub fn check_page(frame: &[Slot], address: PageAddress) -> Result<u32, PageError
     Ok(header[6])
 }
 
-/// The number of records that the header of an open page tells; 0 where it tells none.
+/// The number of records in the header of an open page; 0 in a mesh that is not finished.
 pub fn page_count(frame: &[Slot]) -> u32 {
     frame[HEADER_SLOT][7].to_native()
 }

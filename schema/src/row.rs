@@ -49,10 +49,35 @@ pub enum RowKind {
     /// `Vec<String>`: names of the regions, from region 1 on.
     RegionNames = 78,
     /// [`WiresRow`](crate::catalog::WiresRow).
-    Wires = 79,
+    Embedded = 79,
 }
 
 impl RowKind {
+    /// All kinds, by number.
+    pub const ALL: [Self; 16] = [
+        Self::Format,
+        Self::State,
+        Self::Job,
+        Self::Labels,
+        Self::Regions,
+        Self::Subdomain,
+        Self::File,
+        Self::Interface,
+        Self::Topology,
+        Self::Journal,
+        Self::Blob,
+        Self::Coarse,
+        Self::Previous,
+        Self::Stage,
+        Self::RegionNames,
+        Self::Embedded,
+    ];
+
+    /// The kind of a key; `None` for a key of no row.
+    pub fn from_key(key: u64) -> Option<Self> {
+        Self::ALL.into_iter().find(|&kind| kind as u64 == key >> 56)
+    }
+
     /// Key of a row: kind (8 bits), major (24 bits), minor (32 bits).
     pub const fn key(self, major: u32, minor: u32) -> u64 {
         (self as u64) << 56 | (major as u64 & 0xff_ffff) << 32 | minor as u64

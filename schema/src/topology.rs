@@ -97,7 +97,7 @@ impl BlobContent for StageFaces {
         let (corners, _) = numbers.as_chunks();
         let (faces, _) = corners.as_chunks();
         let natural = usize::try_from(u64::from_le_bytes(*head)).ok()?;
-        if natural > faces.len() || rest.len() != faces.len() * size_of::<Triangle>() {
+        if natural > faces.len() || rest.len() != size_of_val(faces) {
             return None;
         }
         let (natural, chosen) = faces.split_at(natural);

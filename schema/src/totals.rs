@@ -21,7 +21,7 @@ pub struct InterfaceSide {
     pub cut: u32,
     /// The sub-domain on the other side.
     pub other: u32,
-    /// How many faces there are.
+    /// Number of faces.
     pub faces: u64,
     /// Of the faces, seen from this side.
     pub digest: Digest,

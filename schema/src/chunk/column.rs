@@ -2,31 +2,33 @@
 //!
 //! A record lists its fields with their forms in `columns!`, which makes both directions from the one list.
 
-use super::columns::{Columns, Malformed, Reader, unzigzag32, unzigzag64, zigzag32, zigzag64};
+use super::columns::{
+    ColumnReader, ColumnWriter, Malformed, unzigzag32, unzigzag64, zigzag32, zigzag64,
+};
 use crate::record::SealedTet;
 
 /// A form of column for a field of type `V`.
 pub(super) trait Column<V> {
     /// Appends the field of all records, the first of which has number `first`.
-    fn put<R>(records: &[R], first: u32, field: impl Fn(&R) -> &V, columns: &mut Columns);
+    fn put<R>(records: &[R], first: u32, field: impl Fn(&R) -> &V, columns: &mut ColumnWriter);
     /// The inverse of [`Column::put`]. Errors: bytes that no writer writes.
     fn take<R>(
         records: &mut [R],
         first: u32,
         field: impl Fn(&mut R) -> &mut V,
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed>;
 }
 
 /// Both directions of a [`ChunkRecord`](super::ChunkRecord): its fields, or places of them, with their forms.
 macro_rules! columns {
     ($($field:ident $([$place:literal])?: $form:ty,)+) => {
-        fn encode(records: &[Self], first: u32, columns: &mut Columns) {
+        fn encode(records: &[Self], first: u32, columns: &mut ColumnWriter) {
             $(<$form>::put(records, first, |r| &r.$field$([$place])?, columns);)+
         }
 
         fn decode(
-            columns: &mut Reader<'_>,
+            columns: &mut ColumnReader<'_>,
             first: u32,
             count: usize,
             records: &mut Vec<Self>,
@@ -42,7 +44,7 @@ macro_rules! columns {
 pub(super) use columns;
 
 /// An integer of a dictionary.
-pub(super) trait Word: Copy {
+pub(super) trait DictionaryWord: Copy {
     fn to_u64(self) -> u64;
     /// High bits that the type lacks are dropped.
     fn from_u64(word: u64) -> Self;
@@ -50,7 +52,7 @@ pub(super) trait Word: Copy {
 
 macro_rules! words {
     ($($word:ty)+) => {$(
-        impl Word for $word {
+        impl DictionaryWord for $word {
             #[inline]
             fn to_u64(self) -> u64 {
                 u64::from(self)
@@ -64,11 +66,11 @@ macro_rules! words {
 }
 words!(u8 u32 u64);
 
-/// Mostly few different values: see [`Columns::dictionary`].
+/// Mostly few different values: see [`ColumnWriter::dictionary`].
 pub(super) struct Dictionary;
 
-impl<V: Word> Column<V> for Dictionary {
-    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &V, columns: &mut Columns) {
+impl<V: DictionaryWord> Column<V> for Dictionary {
+    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &V, columns: &mut ColumnWriter) {
         columns.dictionary(records.iter().map(|r| field(r).to_u64()));
     }
 
@@ -76,17 +78,19 @@ impl<V: Word> Column<V> for Dictionary {
         records: &mut [R],
         _first: u32,
         field: impl Fn(&mut R) -> &mut V,
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
-        columns.dictionary(records.len(), |i, word| *field(&mut records[i]) = Word::from_u64(word))
+        columns.dictionary(records.len(), |i, word| {
+            *field(&mut records[i]) = DictionaryWord::from_u64(word)
+        })
     }
 }
 
 /// Differences, each to the number before, zigzag, as varints.
-pub(super) struct Steps;
+pub(super) struct Differences;
 
-impl Column<u32> for Steps {
-    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u32, columns: &mut Columns) {
+impl Column<u32> for Differences {
+    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u32, columns: &mut ColumnWriter) {
         steps32(records.iter().map(|r| *field(r))).for_each(|z| columns.varint(u64::from(z)));
     }
 
@@ -94,7 +98,7 @@ impl Column<u32> for Steps {
         records: &mut [R],
         _first: u32,
         field: impl Fn(&mut R) -> &mut u32,
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
         let mut base = 0;
         for r in records {
@@ -105,8 +109,8 @@ impl Column<u32> for Steps {
     }
 }
 
-impl Column<u64> for Steps {
-    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u64, columns: &mut Columns) {
+impl Column<u64> for Differences {
+    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u64, columns: &mut ColumnWriter) {
         steps64(records.iter().map(|r| *field(r))).for_each(|z| columns.varint(z));
     }
 
@@ -114,7 +118,7 @@ impl Column<u64> for Steps {
         records: &mut [R],
         _first: u32,
         field: impl Fn(&mut R) -> &mut u64,
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
         let mut base = 0;
         for r in records {
@@ -126,10 +130,10 @@ impl Column<u64> for Steps {
 }
 
 /// Differences, each to the number before, zigzag, as planes: four of an f32, as many as needed of a u32.
-pub(super) struct StepPlanes;
+pub(super) struct DifferencePlanes;
 
-impl Column<u32> for StepPlanes {
-    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u32, columns: &mut Columns) {
+impl Column<u32> for DifferencePlanes {
+    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u32, columns: &mut ColumnWriter) {
         let steps: Vec<u32> = steps32(records.iter().map(|r| *field(r))).collect();
         columns.planes32(&steps);
     }
@@ -138,7 +142,7 @@ impl Column<u32> for StepPlanes {
         records: &mut [R],
         _first: u32,
         field: impl Fn(&mut R) -> &mut u32,
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
         let mut steps = vec![0; records.len()];
         columns.planes32(&mut steps)?;
@@ -151,8 +155,8 @@ impl Column<u32> for StepPlanes {
     }
 }
 
-impl Column<f32> for StepPlanes {
-    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &f32, columns: &mut Columns) {
+impl Column<f32> for DifferencePlanes {
+    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &f32, columns: &mut ColumnWriter) {
         let steps = steps32(records.iter().map(|r| field(r).to_bits()));
         columns.planes(&steps.map(u64::from).collect::<Vec<_>>(), 4);
     }
@@ -161,7 +165,7 @@ impl Column<f32> for StepPlanes {
         records: &mut [R],
         _first: u32,
         field: impl Fn(&mut R) -> &mut f32,
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
         let mut base = 0;
         let steps = columns.planes(records.len(), 4)?;
@@ -177,7 +181,12 @@ impl Column<f32> for StepPlanes {
 pub(super) struct Points;
 
 impl Column<[f64; 3]> for Points {
-    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &[f64; 3], columns: &mut Columns) {
+    fn put<R>(
+        records: &[R],
+        _first: u32,
+        field: impl Fn(&R) -> &[f64; 3],
+        columns: &mut ColumnWriter,
+    ) {
         let mut steps = Vec::new();
         for axis in 0..3 {
             steps.clear();
@@ -190,7 +199,7 @@ impl Column<[f64; 3]> for Points {
         records: &mut [R],
         _first: u32,
         field: impl Fn(&mut R) -> &mut [f64; 3],
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
         for axis in 0..3 {
             let mut base = 0;
@@ -208,8 +217,13 @@ impl Column<[f64; 3]> for Points {
 pub(super) struct FaceVertices;
 
 impl Column<[u32; 3]> for FaceVertices {
-    fn put<R>(records: &[R], first: u32, field: impl Fn(&R) -> &[u32; 3], columns: &mut Columns) {
-        Steps::put(records, first, |r| &field(r)[0], columns);
+    fn put<R>(
+        records: &[R],
+        first: u32,
+        field: impl Fn(&R) -> &[u32; 3],
+        columns: &mut ColumnWriter,
+    ) {
+        Differences::put(records, first, |r| &field(r)[0], columns);
         for place in 1..3 {
             for r in records {
                 let vertices = field(r);
@@ -222,9 +236,9 @@ impl Column<[u32; 3]> for FaceVertices {
         records: &mut [R],
         first: u32,
         field: impl Fn(&mut R) -> &mut [u32; 3],
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
-        Steps::take(records, first, |r| &mut field(r)[0], columns)?;
+        Differences::take(records, first, |r| &mut field(r)[0], columns)?;
         for place in 1..3 {
             for r in records.iter_mut() {
                 let vertices = field(r);
@@ -239,7 +253,7 @@ impl Column<[u32; 3]> for FaceVertices {
 pub(super) struct TetOrNone;
 
 impl Column<u32> for TetOrNone {
-    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u32, columns: &mut Columns) {
+    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u32, columns: &mut ColumnWriter) {
         let mut base = 0;
         for &tet in records.iter().map(field) {
             if tet == u32::MAX {
@@ -255,7 +269,7 @@ impl Column<u32> for TetOrNone {
         records: &mut [R],
         _first: u32,
         field: impl Fn(&mut R) -> &mut u32,
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
         let mut base = 0;
         for r in records {
@@ -289,7 +303,7 @@ impl Offsets {
 }
 
 impl Column<u64> for VertexNumbers {
-    fn put<R>(records: &[R], first: u32, field: impl Fn(&R) -> &u64, columns: &mut Columns) {
+    fn put<R>(records: &[R], first: u32, field: impl Fn(&R) -> &u64, columns: &mut ColumnWriter) {
         columns.dictionary(records.iter().map(|r| *field(r) >> 32));
         let mut offsets = Offsets::default();
         for (&number, place) in records.iter().map(field).zip(first..) {
@@ -303,7 +317,7 @@ impl Column<u64> for VertexNumbers {
         records: &mut [R],
         first: u32,
         field: impl Fn(&mut R) -> &mut u64,
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
         columns.dictionary(records.len(), |i, owner| *field(&mut records[i]) = owner << 32)?;
         let mut offsets = Offsets::default();
@@ -318,8 +332,8 @@ impl Column<u64> for VertexNumbers {
     }
 }
 
-/// Nodes of rotated tetrahedra, in order of their smallest vertices: four columns of mostly tiny differences.
-pub(super) struct Nodes;
+/// RotatedNodes of rotated tetrahedra, in order of their smallest vertices: four columns of mostly tiny differences.
+pub(super) struct RotatedNodes;
 
 /// The number that node `I` of a tetrahedron is compared with: the nearest one already known.
 ///
@@ -340,7 +354,7 @@ fn put_node<const I: usize, R>(
     records: &[R],
     field: impl Fn(&R) -> &[u32; 4],
     steps: &mut [u32],
-    columns: &mut Columns,
+    columns: &mut ColumnWriter,
 ) {
     let mut before = [0; 4];
     for (z, &nodes) in steps.iter_mut().zip(records.iter().map(field)) {
@@ -350,8 +364,13 @@ fn put_node<const I: usize, R>(
     columns.planes32(steps);
 }
 
-impl Column<[u32; 4]> for Nodes {
-    fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &[u32; 4], columns: &mut Columns) {
+impl Column<[u32; 4]> for RotatedNodes {
+    fn put<R>(
+        records: &[R],
+        _first: u32,
+        field: impl Fn(&R) -> &[u32; 4],
+        columns: &mut ColumnWriter,
+    ) {
         let mut steps = vec![0; records.len()];
         put_node::<0, R>(records, &field, &mut steps, columns);
         put_node::<1, R>(records, &field, &mut steps, columns);
@@ -363,7 +382,7 @@ impl Column<[u32; 4]> for Nodes {
         records: &mut [R],
         _first: u32,
         field: impl Fn(&mut R) -> &mut [u32; 4],
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
         let mut steps = [const { Vec::new() }; 4];
         for column in &mut steps {
@@ -387,7 +406,7 @@ impl Column<[u32; 4]> for Nodes {
     }
 }
 
-/// Nodes in any even order: those of the rotated tetrahedra, then which of [`TURNS`] turns each back.
+/// RotatedNodes in any even order: those of the rotated tetrahedra, then which of [`TURNS`] turns each back.
 pub(super) struct TurnedNodes;
 
 /// The even orders of four nodes.
@@ -435,10 +454,15 @@ fn turned(nodes: [u32; 4]) -> ([u32; 4], u8) {
 }
 
 impl Column<[u32; 4]> for TurnedNodes {
-    fn put<R>(records: &[R], first: u32, field: impl Fn(&R) -> &[u32; 4], columns: &mut Columns) {
+    fn put<R>(
+        records: &[R],
+        first: u32,
+        field: impl Fn(&R) -> &[u32; 4],
+        columns: &mut ColumnWriter,
+    ) {
         let (rotated, turns): (Vec<[u32; 4]>, Vec<u8>) =
             records.iter().map(|r| turned(*field(r))).unzip();
-        Nodes::put(&rotated, first, |nodes| nodes, columns);
+        RotatedNodes::put(&rotated, first, |nodes| nodes, columns);
         columns.raw(&turns);
     }
 
@@ -446,9 +470,9 @@ impl Column<[u32; 4]> for TurnedNodes {
         records: &mut [R],
         first: u32,
         field: impl Fn(&mut R) -> &mut [u32; 4],
-        columns: &mut Reader<'_>,
+        columns: &mut ColumnReader<'_>,
     ) -> Result<(), Malformed> {
-        Nodes::take(records, first, &field, columns)?;
+        RotatedNodes::take(records, first, &field, columns)?;
         let turns = columns.raw(records.len())?;
         for (r, &turn) in records.iter_mut().zip(turns) {
             let turn = TURNS.get(usize::from(turn)).ok_or(Malformed("an unknown turn"))?;

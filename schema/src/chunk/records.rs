@@ -1,13 +1,14 @@
 //! The columns of every kind of record, of sealed sub-domains and of coarse snapshots.
 
 use super::column::{
-    Column, Dictionary, FaceVertices, Nodes, Points, StepPlanes, Steps, TetOrNone, TurnedNodes,
-    VertexNumbers, columns,
+    Column, Dictionary, DifferencePlanes, Differences, FaceVertices, Points, RotatedNodes,
+    TetOrNone, TurnedNodes, VertexNumbers, columns,
 };
-use super::columns::{Columns, Malformed, Reader};
+use super::columns::{ColumnReader, ColumnWriter, Malformed};
 use super::{ChunkKind, ChunkRecord};
 use crate::record::{
-    CoarseFace, CoarseTet, CoarseVertex, Facet, InterfaceFace, SealedFacet, SealedTet, SealedVertex,
+    CoarseFace, CoarseTet, CoarseVertex, InterfaceFace, SealedFacet, SealedTet, SealedVertex,
+    WorkingFacet,
 };
 
 impl ChunkRecord for SealedTet {
@@ -15,7 +16,7 @@ impl ChunkRecord for SealedTet {
     const COUNT_MAX: usize = 32_768;
     const RAW_BYTES_MAX: usize = 4 * 4 + 10;
     columns! {
-        nodes: Nodes,
+        nodes: RotatedNodes,
         region: Dictionary,
     }
 }
@@ -26,7 +27,7 @@ impl ChunkRecord for SealedVertex {
     const RAW_BYTES_MAX: usize = 3 * 8 + 4 + 10 + 10 + 5;
     columns! {
         point: Points,
-        h: StepPlanes,
+        h: DifferencePlanes,
         tag: Dictionary,
         id: VertexNumbers,
     }
@@ -39,7 +40,7 @@ impl ChunkRecord for SealedFacet {
     columns! {
         vertices: FaceVertices,
         label: Dictionary,
-        triangle: Steps,
+        triangle: Differences,
         regions[0]: Dictionary,
         tets[0]: TetOrNone,
         regions[1]: Dictionary,
@@ -55,7 +56,7 @@ impl ChunkRecord for InterfaceFace {
         vertices: FaceVertices,
         cut: Dictionary,
         other: Dictionary,
-        index: Steps,
+        index: Differences,
         tet: TetOrNone,
     }
 }
@@ -79,18 +80,18 @@ impl ChunkRecord for CoarseVertex {
     columns! {
         point: Points,
         tag: Dictionary,
-        owner: StepPlanes,
+        owner: DifferencePlanes,
     }
 }
 
-impl ChunkRecord for Facet {
+impl ChunkRecord for WorkingFacet {
     const KIND: ChunkKind = ChunkKind::CoarseFacets;
     const COUNT_MAX: usize = 16_384;
     const RAW_BYTES_MAX: usize = 3 * 5 + 10 + 10 + 2 * 10;
     columns! {
         vertices: FaceVertices,
         label: Dictionary,
-        triangle: Steps,
+        triangle: Differences,
         regions[0]: Dictionary,
         regions[1]: Dictionary,
     }
@@ -104,6 +105,6 @@ impl ChunkRecord for CoarseFace {
         vertices: FaceVertices,
         cut: Dictionary,
         side: Dictionary,
-        index: Steps,
+        index: Differences,
     }
 }

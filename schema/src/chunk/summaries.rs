@@ -1,6 +1,6 @@
 //! Summaries of chunks: boxes, ranges and counts that tell a reader which chunks to skip.
 
-use super::columns::{Columns, Malformed, Reader};
+use super::columns::{ColumnReader, ColumnWriter, Malformed};
 use super::{ChunkKind, ChunkRecord};
 
 /// Of a chunk of tetrahedra; 128 bytes.
@@ -18,7 +18,7 @@ pub struct TetSummary {
     pub vertices: [u32; 2],
     /// Number of the first record.
     pub first: u32,
-    /// How many records there are.
+    /// Number of records.
     pub count: u32,
     /// Faces without a partner in the chunk: shared with other chunks or on the boundary.
     pub open_faces: u32,
@@ -35,9 +35,9 @@ pub struct VertexSummary {
     pub bounds: [[f64; 3]; 2],
     /// Number of the first record.
     pub first: u32,
-    /// How many records there are.
+    /// Number of records.
     pub count: u32,
-    /// Which cells of the box, divided in four along each axis, have vertices: bit x + 4 y + 16 z. 0: not known.
+    /// Cells of the box, divided in four along each axis, have vertices: bit x + 4 y + 16 z. 0: not known.
     pub cells: u64,
 }
 
@@ -46,7 +46,7 @@ pub struct VertexSummary {
 pub struct RangeSummary<const INTERFACE: bool> {
     /// Number of the first record.
     pub first: u32,
-    /// How many records there are.
+    /// Number of records.
     pub count: u32,
 }
 
@@ -82,12 +82,12 @@ impl<T: Fixed, const N: usize> Fixed for [T; N] {
     }
 }
 
-/// Both directions of a summary: its fields in order, then zeros up to its width. What is read is checked by the given function.
+/// Both directions of a summary: its fields in order, then zeros up to its width. The given function checks a summary that was read.
 macro_rules! fixed_fields {
     ($check:expr; $($field:ident),+) => {
         const RAW_BYTES_MAX: usize = Self::BYTES;
 
-        fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
+        fn encode(records: &[Self], _first: u32, columns: &mut ColumnWriter) {
             for summary in records {
                 let end = columns.bytes.len() + Self::BYTES;
                 $(summary.$field.put(&mut columns.bytes);)+
@@ -96,7 +96,7 @@ macro_rules! fixed_fields {
         }
 
         fn decode(
-            columns: &mut Reader<'_>,
+            columns: &mut ColumnReader<'_>,
             _first: u32,
             count: usize,
             records: &mut Vec<Self>,

@@ -3,7 +3,10 @@
 use crate::chunk::ChunkRecord;
 use crate::ids::{Owner, SubdomainId, VertexId};
 use crate::page::{NONE, PageKind, Slot, dense, sparse, u32_le};
-use crate::record::{Facet, InterfaceFace, SealedFacet, SealedTet, SealedVertex, Tet, Vertex, tag};
+use crate::record::{
+    InterfaceFace, SealedFacet, SealedTet, SealedVertex, WorkingFacet, WorkingTet, WorkingVertex,
+    tag,
+};
 
 const VERTEX_MASK: u32 = (1 << 30) - 1;
 const REQUIRED: u32 = 1 << 31;
@@ -52,7 +55,10 @@ impl SealedTet {
             face => sparse(face >> 2) << 2 | face & 3,
         });
         let node = std::array::from_fn(|i| sparse(self.nodes[i]) | required(i));
-        WorkingWords { slot: Tet { node, neighbor }.to_slot(), extra: [self.region, place.flags] }
+        WorkingWords {
+            slot: WorkingTet { node, neighbor }.to_slot(),
+            extra: [self.region, place.flags],
+        }
     }
 }
 
@@ -61,7 +67,7 @@ impl PageRecord for SealedTet {
     const EXTRA: Option<PageKind> = Some(PageKind::TetAttributes);
 
     fn from_working(working: &WorkingWords, _rank: u32, _n: u32) -> Option<Self> {
-        let tet = Tet::from_slot(&working.slot);
+        let tet = WorkingTet::from_slot(&working.slot);
         (tet.node[0] != NONE).then(|| Self {
             nodes: tet.node.map(|node| dense(node & VERTEX_MASK)),
             region: working.extra[0],
@@ -86,8 +92,11 @@ impl SealedVertex {
             tag::FREE | tag::STEINER => 0,
             _ => FIXED,
         };
-        let vertex =
-            Vertex { point: self.point, h: f32::from_bits(self.h.to_bits() | fixed), v2t: NONE };
+        let vertex = WorkingVertex {
+            point: self.point,
+            h: f32::from_bits(self.h.to_bits() | fixed),
+            v2t: NONE,
+        };
         WorkingWords { slot: vertex.to_slot(), extra: [self.tag | cut << TAG_BITS, index] }
     }
 }
@@ -97,7 +106,7 @@ impl PageRecord for SealedVertex {
     const EXTRA: Option<PageKind> = Some(PageKind::VertexAttributes);
 
     fn from_working(working: &WorkingWords, rank: u32, n: u32) -> Option<Self> {
-        let vertex = Vertex::from_slot(&working.slot);
+        let vertex = WorkingVertex::from_slot(&working.slot);
         let [word, index] = working.extra;
         let (tag, cut) = (word & ((1 << TAG_BITS) - 1), word >> TAG_BITS);
         let owner = match tag {
@@ -130,7 +139,7 @@ fn tet_number(id: u32) -> u32 {
 impl SealedFacet {
     /// As a working facet.
     pub fn to_working(self) -> WorkingWords {
-        let facet = Facet {
+        let facet = WorkingFacet {
             vertices: self.vertices.map(sparse),
             label: self.label,
             triangle: self.triangle,
@@ -145,7 +154,7 @@ impl PageRecord for SealedFacet {
     const EXTRA: Option<PageKind> = Some(PageKind::FacetTets);
 
     fn from_working(working: &WorkingWords, _rank: u32, _n: u32) -> Option<Self> {
-        let facet = Facet::from_slot(&working.slot);
+        let facet = WorkingFacet::from_slot(&working.slot);
         Some(Self {
             vertices: facet.vertices.map(dense),
             label: facet.label,

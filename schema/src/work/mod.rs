@@ -15,7 +15,7 @@ mod order;
 mod receipt;
 mod task;
 
-pub use order::{CutOrder, Order, SubdomainOrder};
+pub use order::{CutOrder, SubdomainOrder, WorkOrder};
 pub use receipt::{CutReceipt, InheritedFace, Receipt, SubdomainReceipt, Traffic};
 pub use task::{PlanRecord, RunRecord, TaskMark, TaskOrders, TaskReceipts};
 
@@ -34,13 +34,13 @@ const HEAD: usize = 24;
 pub enum WorkKind {
     /// [`PlanRecord`] in a file, [`RunRecord`] in a message.
     Plan = 1,
-    /// [`TaskOrders`] in a file, [`Order`] in a message.
+    /// [`TaskOrders`] in a file, [`WorkOrder`] in a message.
     Orders = 2,
     /// [`TaskReceipts`] in a file, [`Receipt`] in a message.
     Receipts = 3,
     /// The size field, as [`Blob::SizeField`](crate::blob::Blob::SizeField) has it.
     SizeField = 4,
-    /// What all sub-domains of a verification have in common; a message.
+    /// Parameters common to all sub-domains of a verification; a message.
     Verification = 5,
     /// The row of a sub-domain to be verified; a message.
     PartOrder = 6,

@@ -10,14 +10,14 @@ use crate::tree::{CutPlane, SubtreeMesh};
 
 /// One unit of work.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq)]
-pub enum Order {
+pub enum WorkOrder {
     /// Bisect a subtree.
     Cut(CutOrder),
     /// Mesh a sub-domain to its final density.
     Subdomain(SubdomainOrder),
 }
 
-impl Order {
+impl WorkOrder {
     /// The name of the file it begins with.
     pub fn input(&self) -> String {
         let mesh = match self {

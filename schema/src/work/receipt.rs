@@ -6,7 +6,7 @@ use super::CutOrder;
 use crate::catalog::{CoarseRow, JournalRow, StageRow, SubdomainRow};
 use crate::tree::{CutPlane, SubtreeMesh};
 
-/// The result of an [`Order`](super::Order). Its files are not yet listed.
+/// The result of a [`WorkOrder`](super::WorkOrder). Its files are not yet listed.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug)]
 pub enum Receipt {
     /// A bisected subtree.

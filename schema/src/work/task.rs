@@ -2,9 +2,9 @@
 
 use rkyv::{Archive, Deserialize, Serialize};
 
-use super::{Order, Receipt};
+use super::{Receipt, WorkOrder};
 
-/// The file `plan`: what all tasks have in common.
+/// The file `plan`: parameters common to all tasks.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq)]
 pub struct PlanRecord {
     /// Differs between any two plans: receipts of another plan do not count.
@@ -21,7 +21,7 @@ pub struct PlanRecord {
     pub options: String,
 }
 
-/// What all orders to processes without a plan have in common; a message.
+/// Parameters common to all orders of a run without a plan; a message.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq)]
 pub struct RunRecord {
     /// Version of the recipe.
@@ -42,7 +42,7 @@ pub struct TaskOrders {
     /// Number of the task.
     pub task: u32,
     /// Its orders.
-    pub orders: Vec<Order>,
+    pub orders: Vec<WorkOrder>,
     /// True if the cuts below those of the orders belong to them.
     pub below: bool,
 }

@@ -63,9 +63,9 @@ impl<P: Pages> Mesh<P> {
     }
 
     /// Facet number `n`.
-    pub fn snapshot_facet(&mut self, n: u32) -> record::Facet {
+    pub fn snapshot_facet(&mut self, n: u32) -> record::WorkingFacet {
         let facet = self.facet(n);
-        record::Facet {
+        record::WorkingFacet {
             vertices: facet.vertices.map(dense),
             label: facet.label,
             triangle: facet.input,
@@ -110,7 +110,7 @@ impl<P: Pages> Mesh<P> {
     }
 
     /// Adds a facet as it was kept.
-    pub fn add_snapshot_facet(&mut self, facet: &record::Facet) {
+    pub fn add_snapshot_facet(&mut self, facet: &record::WorkingFacet) {
         self.add_facet(Facet {
             vertices: facet.vertices.map(sparse),
             label: facet.label,

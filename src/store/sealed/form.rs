@@ -2,7 +2,7 @@
 //!
 //! Both hold the same records in the same order under the same numbers, so whoever reads sees no difference.
 
-use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, Packed, Packer};
+use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, PackedChunk, Packer};
 use tetdb_schema::page::PageError;
 use tetdb_schema::unsealed::{PageDecoder, PagePacker, PageRecord, PageSet, WorkingWords};
 
@@ -53,8 +53,8 @@ impl<R> Cut<R> {
     }
 }
 
-impl<R> From<Packed<R>> for Cut<R> {
-    fn from(chunk: Packed<R>) -> Self {
+impl<R> From<PackedChunk<R>> for Cut<R> {
+    fn from(chunk: PackedChunk<R>) -> Self {
         Self {
             first: chunk.first,
             records: chunk.records,

@@ -394,7 +394,7 @@ impl Catalog {
 
     /// Edges and points that are edges and vertices of the mesh.
     pub fn wires(&mut self) -> Result<WiresRow, StoreError> {
-        let wires = self.row(RowKind::Wires.key(0, 0))?;
+        let wires = self.row(RowKind::Embedded.key(0, 0))?;
         Ok(wires.unwrap_or(WiresRow { fin_first: u64::MAX, ..WiresRow::default() }))
     }
 

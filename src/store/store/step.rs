@@ -71,7 +71,7 @@ impl Step {
 
     /// Edges and points, where there are any.
     pub fn set_wires(&mut self, wires: &WiresRow) {
-        self.put(RowKind::Wires.key(0, 0), wires);
+        self.put(RowKind::Embedded.key(0, 0), wires);
     }
 
     /// A sub-domain, new or changed.

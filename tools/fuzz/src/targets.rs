@@ -19,8 +19,8 @@ use tetdb_schema::page::{
     seal_full_page, seal_page,
 };
 use tetdb_schema::record::{
-    CoarseFace, CoarseTet, CoarseVertex, Facet, InterfaceFace, SealedFacet, SealedTet,
-    SealedVertex, Tet, TetAttribute, Vertex,
+    CoarseFace, CoarseTet, CoarseVertex, InterfaceFace, SealedFacet, SealedTet, SealedVertex,
+    TetAttribute, WorkingFacet, WorkingTet, WorkingVertex,
 };
 use tetdb_schema::unsealed::{PageDecoder, PageRecord, extra_page};
 use xxhash_rust::xxh3::xxh3_64;
@@ -56,7 +56,7 @@ pub const TARGETS: &[Target] = &[
     text("config", config),
     text("option", option),
     Target { name: "page", format: None, run: page },
-    Target { name: "leaf", format: None, run: leaf },
+    Target { name: "unsealed", format: None, run: unsealed },
     Target { name: "chunk", format: None, run: chunk },
     Target { name: "file", format: None, run: crate::file::changed },
     Target { name: "store", format: None, run: crate::store::changed },
@@ -156,26 +156,26 @@ fn page(bytes: &[u8]) {
     let elsewhere = PageAddress { page: 8, ..address };
     assert!(open_page(&stored, elsewhere, &mut frame[..]).is_err());
     for slot in frame.iter().take(64) {
-        assert_eq!(Tet::from_slot(slot).to_slot(), *slot);
-        assert_eq!(Facet::from_slot(slot).to_slot(), *slot);
-        let _ = (Vertex::from_slot(slot), TetAttribute::from_slot(slot, 3));
+        assert_eq!(WorkingTet::from_slot(slot).to_slot(), *slot);
+        assert_eq!(WorkingFacet::from_slot(slot).to_slot(), *slot);
+        let _ = (WorkingVertex::from_slot(slot), TetAttribute::from_slot(slot, 3));
     }
 }
 
 /// Two bytes of count, then the slots of a page and of the one beside it.
-fn leaf(bytes: &[u8]) {
+fn unsealed(bytes: &[u8]) {
     let Some((&kind, rest)) = bytes.split_first() else {
         return;
     };
     match kind % 4 {
-        0 => leaf_records::<SealedTet>(rest),
-        1 => leaf_records::<SealedVertex>(rest),
-        2 => leaf_records::<SealedFacet>(rest),
-        _ => leaf_records::<InterfaceFace>(rest),
+        0 => unsealed_records::<SealedTet>(rest),
+        1 => unsealed_records::<SealedVertex>(rest),
+        2 => unsealed_records::<SealedFacet>(rest),
+        _ => unsealed_records::<InterfaceFace>(rest),
     }
 }
 
-fn leaf_records<R: PageRecord>(bytes: &[u8]) {
+fn unsealed_records<R: PageRecord>(bytes: &[u8]) {
     /// So that the page beside it is not its first.
     const PAGE: u32 = 9;
     let mut decoder = PageDecoder::new(5, 2);
@@ -218,7 +218,7 @@ fn chunk(bytes: &[u8]) {
         7 => records::<RangeSummary<false>>(rest),
         8 => records::<CoarseTet>(rest),
         9 => records::<CoarseVertex>(rest),
-        10 => records::<Facet>(rest),
+        10 => records::<WorkingFacet>(rest),
         _ => records::<CoarseFace>(rest),
     }
 }

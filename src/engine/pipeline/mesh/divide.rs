@@ -10,7 +10,7 @@ use crate::pipeline::tree;
 use crate::pipeline::work::{Worker, Workplace};
 use crate::pipeline::workers::{Hand, work_off};
 use tetdb_kernel::bisect::CutReport;
-use tetdb_schema::work::{CutOrder, CutReceipt, Order, Receipt};
+use tetdb_schema::work::{CutOrder, CutReceipt, Receipt, WorkOrder};
 
 /// What a cut was, and how it went where this process made it.
 type CutDone = (CutOrder, CutReceipt, Option<CutReport>);
@@ -45,7 +45,7 @@ impl Run<'_> {
                 move |(order, _): (CutOrder, Plan), _: &Watcher| match ask(
                     &**helpers,
                     *slot,
-                    &Order::Cut(order.clone()),
+                    &WorkOrder::Cut(order.clone()),
                     store,
                 )? {
                     Receipt::Cut(receipt) => Ok((order, receipt, None)),

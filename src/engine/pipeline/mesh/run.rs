@@ -30,7 +30,7 @@ use tetdb_kernel::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
 use tetdb_schema::blob::{Blob, BlobContent};
 use tetdb_schema::catalog::{RegionRow, StoreState, WiresRow};
 use tetdb_schema::tree::{RankRange, SubtreeMesh};
-use tetdb_schema::work::{Order, Receipt, SubdomainOrder, SubdomainReceipt, Traffic};
+use tetdb_schema::work::{Receipt, SubdomainOrder, SubdomainReceipt, Traffic, WorkOrder};
 use tetdb_store::store::{Catalog, INPUT_TRIANGLES};
 
 /// Generation of the coarse mesh.
@@ -349,7 +349,7 @@ impl<'a> Run<'a> {
                 move |order: SubdomainOrder, _: &Watcher| match ask(
                     &**helpers,
                     *slot,
-                    &Order::Subdomain(order),
+                    &WorkOrder::Subdomain(order),
                     store,
                 )? {
                     Receipt::Subdomain(receipt) => Ok((Box::new(receipt), None)),

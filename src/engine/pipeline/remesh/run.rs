@@ -49,13 +49,13 @@ pub struct RemeshRun<'a> {
 }
 
 /// A sub-domain to be made again.
-struct Job {
+struct RemeshJob {
     subdomain: SubdomainJob,
     kept: CoarseRow,
     path: DiskPath,
 }
 
-impl Job {
+impl RemeshJob {
     fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
         let Self { subdomain, kept, path } = self;
         let (share, generation) = (subdomain.share, subdomain.generation);
@@ -215,11 +215,11 @@ impl<'a> RemeshRun<'a> {
         let whole = Arc::clone(&self.field);
         let common = Common::of(self.options, &whole, bounds)?;
         let mut state = (self, BTreeMap::new());
-        let run = &|job: Job, watch: &Watcher| job.run(common, watch).map(Box::new);
+        let run = &|job: RemeshJob, watch: &Watcher| job.run(common, watch).map(Box::new);
         map_bounded(
             &mut state,
             fields.into_iter().collect(),
-            &vec![run as Hand<Job, Box<FinishedSubdomain>>; workers],
+            &vec![run as Hand<RemeshJob, Box<FinishedSubdomain>>; workers],
             watch,
             |(again, _), (rank, field)| again.job(meshes[rank as usize], field, share),
             |(_, finished), subdomain| {
@@ -236,7 +236,7 @@ impl<'a> RemeshRun<'a> {
         mesh: SubtreeMesh,
         field: Option<SizeField>,
         share: Plan,
-    ) -> Result<Job, PipelineError> {
+    ) -> Result<RemeshJob, PipelineError> {
         let rank = mesh.ranks.first;
         let mut owners = BTreeMap::new();
         for cut in mesh.ranks.cuts_above(self.n) {
@@ -269,7 +269,7 @@ impl<'a> RemeshRun<'a> {
             owners,
             share,
         };
-        Ok(Job { subdomain, kept, path: self.catalog.coarse_path(rank, kept.generation) })
+        Ok(RemeshJob { subdomain, kept, path: self.catalog.coarse_path(rank, kept.generation) })
     }
 
     fn commit(

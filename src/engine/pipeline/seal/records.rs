@@ -16,7 +16,7 @@ sort_record! {
 
 sort_record! {
     /// A required face of a tetrahedron.
-    pub struct RequiredFace {
+    pub struct RequiredTetFace {
         /// Ascending.
         pub vertices: [u32; 3],
         pub tet: u32,
@@ -27,7 +27,7 @@ sort_record! {
 
 sort_record! {
     /// A facet or an interface face, which is a required face of its tetrahedra.
-    pub struct Claim {
+    pub struct InputFace {
         /// Ascending.
         pub vertices: [u32; 3],
         pub number: u32,
@@ -40,7 +40,7 @@ sort_record! {
 
 sort_record! {
     /// A face of a tetrahedron.
-    pub struct TetFace {
+    pub struct SortedTetFace {
         /// Ascending.
         pub vertices: [u32; 3],
         /// 4 · tetrahedron + face.
@@ -50,7 +50,7 @@ sort_record! {
 
 sort_record! {
     /// Two sides of a face, each as 4 · tetrahedron + face.
-    pub struct Link {
+    pub struct NeighborLink {
         pub from: u32,
         pub to: u32,
     }

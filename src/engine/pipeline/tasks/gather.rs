@@ -19,7 +19,7 @@ use tetdb_schema::blob::Blob;
 use tetdb_schema::catalog::StoreState;
 use tetdb_schema::tree::{RankRange, SubtreeMesh};
 use tetdb_schema::work::{
-    CutReceipt, Order, PlanRecord, Receipt, TaskOrders, TaskReceipts, WorkKind,
+    CutReceipt, PlanRecord, Receipt, TaskOrders, TaskReceipts, WorkKind, WorkOrder,
 };
 use tetdb_store::store::{Catalog, StoreError};
 
@@ -258,12 +258,12 @@ impl GatherRun<'_> {
             let within = part.ranks();
             for part in parts.iter().filter(|p| within.contains(&p.ranks.first)) {
                 if !sealed.contains(&part.ranks.first) {
-                    orders.push(Order::Subdomain(subdomain_order(self.catalog, n, *part)?));
+                    orders.push(WorkOrder::Subdomain(subdomain_order(self.catalog, n, *part)?));
                 }
             }
         } else {
             for part in wide_within(&parts, part) {
-                orders.push(Order::Cut(cut_order(self.catalog, n, *part)?));
+                orders.push(WorkOrder::Cut(cut_order(self.catalog, n, *part)?));
             }
         }
         let record = TaskOrders {

@@ -21,7 +21,7 @@ use tetdb_base::storage::{Budget, DiskPath, ScratchSpace, StorageError, attempt,
 use tetdb_kernel::sizing::SizeField;
 use tetdb_schema::tree::CutPlane;
 use tetdb_schema::work::{
-    Order, PlanRecord, Receipt, TaskMark, TaskOrders, TaskReceipts, WorkKind,
+    PlanRecord, Receipt, TaskMark, TaskOrders, TaskReceipts, WorkKind, WorkOrder,
 };
 use tetdb_store::store::Catalog;
 
@@ -246,16 +246,16 @@ impl<'a> Attempt<'a> {
         let (first, later) = (at_once(orders.len()), at_once(usize::MAX));
         let jobs = orders.iter().rev().map(|order| (order.clone(), first));
         let mut receipts = Vec::new();
-        let run = &|(order, share): (Order, Plan), watch: &Watcher| {
+        let run = &|(order, share): (WorkOrder, Plan), watch: &Watcher| {
             let zones = match &order {
-                Order::Cut(cut) if self.orders.below => Some(cut.zones.clone()),
+                WorkOrder::Cut(cut) if self.orders.below => Some(cut.zones.clone()),
                 _ => None,
             };
             Ok((zones, worker.perform(order, share, watch)?))
         };
         work_off(
             jobs.collect(),
-            &vec![run as Hand<(Order, Plan), Below>; share.workers()],
+            &vec![run as Hand<(WorkOrder, Plan), Below>; share.workers()],
             watch,
             &mut |(zones, receipt)| {
                 let mut next = Vec::new();
@@ -263,7 +263,7 @@ impl<'a> Attempt<'a> {
                     // What is in the store stays; only what this attempt wrote and has cut since is of no use any more.
                     let parent = Catalog::file_name(cut.parent.ranks.first, cut.parent.generation);
                     output.join(parent).remove_file()?;
-                    next.extend(cut.below(&zones).map(|order| (Order::Cut(order), later)));
+                    next.extend(cut.below(&zones).map(|order| (WorkOrder::Cut(order), later)));
                     next.reverse();
                 }
                 receipts.push(receipt);

@@ -17,7 +17,7 @@ use tetdb_base::storage::RemoteFailure;
 use tetdb_base::storage::{Budget, DiskPath, RunContext, ScratchSpace, attempt};
 use tetdb_kernel::sizing::SizeField;
 use tetdb_schema::blob::Blob;
-use tetdb_schema::work::{Order, Receipt, RunRecord, WorkKind, from_bytes, to_bytes};
+use tetdb_schema::work::{Receipt, RunRecord, WorkKind, WorkOrder, from_bytes, to_bytes};
 use tetdb_store::store::Catalog;
 
 /// How long files of other machines may be late.
@@ -48,7 +48,7 @@ pub fn begin(
 pub fn ask(
     helpers: &dyn Helpers,
     slot: usize,
-    order: &Order,
+    order: &WorkOrder,
     store: &DiskPath,
 ) -> Result<Receipt, PipelineError> {
     let bytes = helpers.perform(slot, to_bytes(WorkKind::Orders, order))?;
@@ -124,7 +124,7 @@ pub fn serve(
     };
     let one = |order: &[u8], watch: &Watcher| {
         attempt(|| {
-            let order: Order =
+            let order: WorkOrder =
                 from_bytes(WorkKind::Orders, order).map_err(|e| damaged(&store, &e))?;
             let patience = Patience::of(settings.wait);
             wait_for(&store.join(order.input()), patience)?;

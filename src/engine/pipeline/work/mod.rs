@@ -1,6 +1,6 @@
 //! Units of work that any process can do which sees the store's files: a cut, a sub-domain.
 //!
-//! A [`Worker`] turns an [`Order`](tetdb_schema::work::Order) into a [`Receipt`](tetdb_schema::work::Receipt). It needs the order, the
+//! A [`Worker`] turns a [`WorkOrder`](tetdb_schema::work::WorkOrder) into a [`Receipt`](tetdb_schema::work::Receipt). It needs the order, the
 //! files that the order names and the size field, and never opens the catalog. The holder of the store's lock draws up orders and
 //! commits receipts, in any order. Threads of this process, files of a batch scheduler's tasks or messages between processes carry
 //! them; their bytes are the same in all three ([`tetdb_schema::work`]).

@@ -11,7 +11,7 @@ use crate::pipeline::progress::Watcher;
 use crate::pipeline::tree::DONE;
 use tetdb_base::storage::DiskPath;
 use tetdb_kernel::bisect::CutReport;
-use tetdb_schema::work::{CutOrder, CutReceipt, Order, Receipt, SubdomainOrder};
+use tetdb_schema::work::{CutOrder, CutReceipt, Receipt, SubdomainOrder, WorkOrder};
 use tetdb_store::store::{Catalog, StoreError};
 
 /// Where a worker finds files and leaves new ones.
@@ -58,13 +58,13 @@ impl Worker<'_> {
     /// Does one order, with the memory of `share`.
     pub fn perform(
         &self,
-        order: Order,
+        order: WorkOrder,
         share: Plan,
         watch: &Watcher,
     ) -> Result<Receipt, PipelineError> {
         match order {
-            Order::Cut(order) => Ok(Receipt::Cut(self.cut(&order, share, watch)?.0)),
-            Order::Subdomain(order) => {
+            WorkOrder::Cut(order) => Ok(Receipt::Cut(self.cut(&order, share, watch)?.0)),
+            WorkOrder::Subdomain(order) => {
                 let job = self.subdomain_job(order, share)?;
                 let finished = job.run(self.common, watch)?;
                 Ok(Receipt::Subdomain(finished.receipt()))
