@@ -19,7 +19,7 @@ pub struct RankRange {
 
 impl RankRange {
     /// The root of a tree of `n` sub-domains.
-    pub const fn whole(n: u32) -> Self {
+    pub const fn root(n: u32) -> Self {
         Self { first: 0, count: n }
     }
 
@@ -59,7 +59,7 @@ impl RankRange {
 
     /// The way down from the root: the cuts passed, and the node where it ends.
     fn path(self, n: u32) -> (Vec<u32>, Self) {
-        let (mut cuts, mut at) = (Vec::new(), Self::whole(n));
+        let (mut cuts, mut at) = (Vec::new(), Self::root(n));
         while at != self && at.count > 1 {
             cuts.push(at.cut());
             let [low, high] = at.children();
@@ -265,7 +265,7 @@ mod tests {
         for n in [1, 2, 3, 5, 7, 100, 4096] {
             let mut ranks = 0;
             let mut cuts = Vec::new();
-            let mut stack = vec![RankRange::whole(n)];
+            let mut stack = vec![RankRange::root(n)];
             while let Some(node) = stack.pop() {
                 if node.count == 1 {
                     assert_eq!(node.first, ranks);

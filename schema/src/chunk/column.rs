@@ -8,10 +8,10 @@ use super::columns::{
 use crate::record::SealedTet;
 
 /// A form of column for a field of type `V`.
-pub(super) trait Column<V> {
+pub(super) trait ColumnForm<V> {
     /// Appends the field of all records, the first of which has number `first`.
     fn put<R>(records: &[R], first: u32, field: impl Fn(&R) -> &V, columns: &mut ColumnWriter);
-    /// The inverse of [`Column::put`]. Errors: bytes that no writer writes.
+    /// The inverse of [`ColumnForm::put`]. Errors: bytes that no writer writes.
     fn take<R>(
         records: &mut [R],
         first: u32,
@@ -69,7 +69,7 @@ words!(u8 u32 u64);
 /// Mostly few different values: see [`ColumnWriter::dictionary`].
 pub(super) struct Dictionary;
 
-impl<V: DictionaryWord> Column<V> for Dictionary {
+impl<V: DictionaryWord> ColumnForm<V> for Dictionary {
     fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &V, columns: &mut ColumnWriter) {
         columns.dictionary(records.iter().map(|r| field(r).to_u64()));
     }
@@ -89,7 +89,7 @@ impl<V: DictionaryWord> Column<V> for Dictionary {
 /// Differences, each to the number before, zigzag, as varints.
 pub(super) struct Differences;
 
-impl Column<u32> for Differences {
+impl ColumnForm<u32> for Differences {
     fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u32, columns: &mut ColumnWriter) {
         steps32(records.iter().map(|r| *field(r))).for_each(|z| columns.varint(u64::from(z)));
     }
@@ -109,7 +109,7 @@ impl Column<u32> for Differences {
     }
 }
 
-impl Column<u64> for Differences {
+impl ColumnForm<u64> for Differences {
     fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u64, columns: &mut ColumnWriter) {
         steps64(records.iter().map(|r| *field(r))).for_each(|z| columns.varint(z));
     }
@@ -132,7 +132,7 @@ impl Column<u64> for Differences {
 /// Differences, each to the number before, zigzag, as planes: four of an f32, as many as needed of a u32.
 pub(super) struct DifferencePlanes;
 
-impl Column<u32> for DifferencePlanes {
+impl ColumnForm<u32> for DifferencePlanes {
     fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u32, columns: &mut ColumnWriter) {
         let steps: Vec<u32> = steps32(records.iter().map(|r| *field(r))).collect();
         columns.planes32(&steps);
@@ -155,7 +155,7 @@ impl Column<u32> for DifferencePlanes {
     }
 }
 
-impl Column<f32> for DifferencePlanes {
+impl ColumnForm<f32> for DifferencePlanes {
     fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &f32, columns: &mut ColumnWriter) {
         let steps = steps32(records.iter().map(|r| field(r).to_bits()));
         columns.planes(&steps.map(u64::from).collect::<Vec<_>>(), 4);
@@ -180,7 +180,7 @@ impl Column<f32> for DifferencePlanes {
 /// Coordinates, an axis after the other, as planes of differences: the high bytes of neighbors agree, the low ones are noise.
 pub(super) struct Points;
 
-impl Column<[f64; 3]> for Points {
+impl ColumnForm<[f64; 3]> for Points {
     fn put<R>(
         records: &[R],
         _first: u32,
@@ -216,7 +216,7 @@ impl Column<[f64; 3]> for Points {
 /// Three vertices: the first as a difference to the face before, the others to the first.
 pub(super) struct FaceVertices;
 
-impl Column<[u32; 3]> for FaceVertices {
+impl ColumnForm<[u32; 3]> for FaceVertices {
     fn put<R>(
         records: &[R],
         first: u32,
@@ -252,7 +252,7 @@ impl Column<[u32; 3]> for FaceVertices {
 /// A tetrahedron, or none (all bits set): 0 for none, else 1 + the difference to the last.
 pub(super) struct TetOrNone;
 
-impl Column<u32> for TetOrNone {
+impl ColumnForm<u32> for TetOrNone {
     fn put<R>(records: &[R], _first: u32, field: impl Fn(&R) -> &u32, columns: &mut ColumnWriter) {
         let mut base = 0;
         for &tet in records.iter().map(field) {
@@ -302,7 +302,7 @@ impl Offsets {
     }
 }
 
-impl Column<u64> for VertexNumbers {
+impl ColumnForm<u64> for VertexNumbers {
     fn put<R>(records: &[R], first: u32, field: impl Fn(&R) -> &u64, columns: &mut ColumnWriter) {
         columns.dictionary(records.iter().map(|r| *field(r) >> 32));
         let mut offsets = Offsets::default();
@@ -364,7 +364,7 @@ fn put_node<const I: usize, R>(
     columns.planes32(steps);
 }
 
-impl Column<[u32; 4]> for RotatedNodes {
+impl ColumnForm<[u32; 4]> for RotatedNodes {
     fn put<R>(
         records: &[R],
         _first: u32,
@@ -453,7 +453,7 @@ fn turned(nodes: [u32; 4]) -> ([u32; 4], u8) {
     (rotated, back)
 }
 
-impl Column<[u32; 4]> for TurnedNodes {
+impl ColumnForm<[u32; 4]> for TurnedNodes {
     fn put<R>(
         records: &[R],
         first: u32,

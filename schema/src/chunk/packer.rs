@@ -120,7 +120,7 @@ impl<R: ChunkRecord> Packer<R> {
         }
     }
 
-    /// Takes the first `n` records, whose value the encoder made last.
+    /// Takes the first `n` records, whose value the encoder wrote last.
     fn take(&mut self, n: usize) -> PackedChunk<R> {
         let records: Vec<R> = self.pending.drain(..n).collect();
         let value = self.encoder.last_value().to_vec();

@@ -1,7 +1,7 @@
 //! The columns of every kind of record, of sealed sub-domains and of coarse snapshots.
 
 use super::column::{
-    Column, Dictionary, DifferencePlanes, Differences, FaceVertices, Points, RotatedNodes,
+    ColumnForm, Dictionary, DifferencePlanes, Differences, FaceVertices, Points, RotatedNodes,
     TetOrNone, TurnedNodes, VertexNumbers, columns,
 };
 use super::columns::{ColumnReader, ColumnWriter, Malformed};

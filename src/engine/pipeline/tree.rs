@@ -118,7 +118,7 @@ mod tests {
         std::fs::write(&path, vec![0; 5 * STORED_BYTES]).expect("room");
         let base = DiskPath::from(path.as_path());
         let mut mesh = SubtreeMesh {
-            ranks: RankRange::whole(1),
+            ranks: RankRange::root(1),
             generation: 1,
             state: MeshState::default(),
             extents: [[0; 2]; WORKING_KINDS.len()],

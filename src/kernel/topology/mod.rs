@@ -1,4 +1,4 @@
-//! Who neighbors whom: the number of faces that each two subtrees share, kept up at every bisection.
+//! Neighbors: the number of faces that each two subtrees share, updated at every bisection.
 //!
 //! A subtree of the bisection tree is named by its first rank. When it is bisected, its low child keeps the name. Only the faces of
 //! the high child change owner ([`FaceOwners`](tetdb_schema::topology::FaceOwners)), and with them two of these numbers.

@@ -24,7 +24,7 @@ pub fn cut_order(
     Ok(CutOrder { parent, zones })
 }
 
-/// The order that meshes a sub-domain, once all cuts are made. Errors: a damaged catalog.
+/// The order that meshes a sub-domain, once there are all cuts. Errors: a damaged catalog.
 pub fn subdomain_order(
     catalog: &mut Catalog,
     n: u32,

@@ -1,4 +1,4 @@
-//! Who owns the faces of a cut and who neighbors whom, as the catalog keeps it.
+//! Owners of the faces of cuts, and neighbors of subtrees, as the catalog keeps them.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,7 +24,7 @@ pub struct NewCut<'a> {
     pub inherited: &'a [InheritedFace],
 }
 
-/// What cuts change in the catalog's tables of owners and neighbors.
+/// Changes of the catalog's tables of owners and neighbors by cuts.
 pub struct TopologyChange {
     /// By cut.
     owners: BTreeMap<u32, FaceOwners>,

@@ -265,7 +265,7 @@ impl<'a> Run<'a> {
         let path = self.catalog.file_path(0, COARSE);
         mesh.pages_mut().end_generation(path, COARSE + DONE);
         let part = SubtreeMesh {
-            ranks: RankRange::whole(n),
+            ranks: RankRange::root(n),
             generation: COARSE,
             state: mesh.state(),
             extents: mesh.pages().extents(),

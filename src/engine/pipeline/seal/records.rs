@@ -1,4 +1,4 @@
-//! What is sorted while a sub-domain is sealed.
+//! Records that are sorted while a sub-domain is sealed.
 
 use tetdb_base::storage::sort_record;
 
@@ -20,7 +20,7 @@ sort_record! {
         /// Ascending.
         pub vertices: [u32; 3],
         pub tet: u32,
-        /// Whether ascending order is odd in the tetrahedron.
+        /// True if the ascending order is odd in the tetrahedron.
         pub odd: bool,
     }
 }
@@ -31,7 +31,7 @@ sort_record! {
         /// Ascending.
         pub vertices: [u32; 3],
         pub number: u32,
-        /// Whether ascending order is odd in it.
+        /// True if the ascending order is odd in the facet or interface face.
         pub odd: bool,
         /// An interface face, not a facet.
         pub at_interface: bool,

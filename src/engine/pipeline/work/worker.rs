@@ -1,4 +1,4 @@
-//! Who does orders: the same for every carrier.
+//! The worker: it performs orders, whoever carries them.
 
 use std::collections::BTreeMap;
 
@@ -98,7 +98,7 @@ impl Worker<'_> {
         job.run(watch)
     }
 
-    /// What a sub-domain takes.
+    /// The meshing of a sub-domain, ready to run.
     pub fn subdomain_job(
         &self,
         order: SubdomainOrder,
