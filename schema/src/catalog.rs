@@ -5,7 +5,7 @@ use rkyv::{Archive, Deserialize, Serialize};
 /// Bins of the quality table: [1,2[, [2,3[ .. [9,10[, [10,inf[.
 pub const QUALITY_BINS: usize = 10;
 
-/// How far a store is.
+/// The state of a store.
 #[derive(
     Archive,
     Serialize,
@@ -21,7 +21,7 @@ pub const QUALITY_BINS: usize = 10;
 )]
 #[serde(rename_all = "snake_case")]
 pub enum StoreState {
-    /// The job is known, nothing is imported.
+    /// The job is on record, nothing is imported.
     New,
     /// The surface is in the store.
     Imported,
@@ -36,13 +36,13 @@ pub enum StoreState {
 }
 
 impl StoreState {
-    /// Whether the mesh is complete.
+    /// True if the mesh is complete.
     pub fn is_finished(self) -> bool {
         self >= Self::Sealed
     }
 }
 
-/// How far a sub-domain is.
+/// The state of a sub-domain.
 #[derive(
     Archive,
     Serialize,
@@ -68,12 +68,12 @@ pub enum SubdomainState {
     Sealed,
 }
 
-/// What was asked for; written by the first commit.
+/// The job of a store, written by the first commit.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, Default, serde::Serialize)]
 pub struct Job {
     /// All options as one JSON object.
     pub options: String,
-    /// What the surface was read from, in order.
+    /// The sources of the surface, in order.
     pub surfaces: Vec<SurfaceSource>,
     /// Version of the program that created the store.
     pub tool_version: String,
@@ -99,7 +99,7 @@ pub struct RegionRow {
     pub volume: f64,
     /// Its tetrahedra in all sub-domains.
     pub tets: u64,
-    /// Whether it is meshed; else it is empty space.
+    /// True if it is meshed; otherwise it is empty space.
     pub filled: bool,
     /// Labels of the facets around it, ascending.
     pub labels: Vec<u32>,
@@ -112,7 +112,7 @@ pub struct WiresRow {
     pub edges: Vec<[u32; 3]>,
     /// The vertex of each point, and its label.
     pub points: Vec<[u32; 2]>,
-    /// Facets with this number or a higher one are no triangles of the input: each holds an edge.
+    /// Facets with this number or a higher one are not triangles of the input: each supports an embedded edge.
     pub fin_first: u64,
 }
 
@@ -136,7 +136,7 @@ pub struct SubdomainRow {
     pub rank: u32,
     /// The generation of its file that counts.
     pub generation: u32,
-    /// How far it is.
+    /// Its state.
     pub state: SubdomainState,
     /// Tetrahedra.
     pub tets: u64,
@@ -162,7 +162,10 @@ pub struct SubdomainRow {
     pub bytes: u64,
 }
 
-/// A file of the store that counts.
+const SUBDOMAIN: &str = "subdomain";
+const COARSE: &str = "coarse";
+
+/// A file of the store that counts: the working or sealed mesh of a sub-domain in one generation.
 #[derive(
     Archive,
     Serialize,
@@ -183,7 +186,58 @@ pub struct FileRow {
     pub generation: u32,
 }
 
-/// A coarse snapshot: the working mesh a sub-domain was meshed from, kept.
+impl FileRow {
+    /// Name of the file of a sub-domain.
+    pub fn subdomain_name(self) -> String {
+        self.name(SUBDOMAIN)
+    }
+
+    /// Name of the file of a coarse snapshot.
+    pub fn coarse_name(self) -> String {
+        self.name(COARSE)
+    }
+
+    /// The inverse of [`FileRow::subdomain_name`].
+    pub fn from_subdomain_name(name: &str) -> Option<Self> {
+        Self::from_name(SUBDOMAIN, name)
+    }
+
+    /// The inverse of [`FileRow::coarse_name`].
+    pub fn from_coarse_name(name: &str) -> Option<Self> {
+        Self::from_name(COARSE, name)
+    }
+
+    fn name(self, prefix: &str) -> String {
+        format!("{prefix}-{:05}-g{}.redb", self.subdomain, self.generation)
+    }
+
+    fn from_name(prefix: &str, name: &str) -> Option<Self> {
+        let (subdomain, generation) = name
+            .strip_prefix(prefix)?
+            .strip_prefix('-')?
+            .strip_suffix(".redb")?
+            .split_once("-g")?;
+        let file =
+            Self { subdomain: subdomain.parse().ok()?, generation: generation.parse().ok()? };
+        (file.name(prefix) == name).then_some(file)
+    }
+}
+
+impl SubdomainRow {
+    /// Its file.
+    pub const fn file(&self) -> FileRow {
+        FileRow { subdomain: self.rank, generation: self.generation }
+    }
+}
+
+impl CoarseRow {
+    /// Its file.
+    pub const fn file(&self) -> FileRow {
+        FileRow { subdomain: self.rank, generation: self.generation }
+    }
+}
+
+/// A coarse snapshot: the working mesh from which a sub-domain was meshed.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct CoarseRow {
     /// Rank of the sub-domain.
@@ -213,13 +267,13 @@ pub struct InterfaceRow {
     pub low: u32,
     /// The higher rank.
     pub high: u32,
-    /// How many faces there are.
+    /// Number of faces.
     pub faces: u64,
     /// Digest of the faces; the same from both sides.
     pub digest: [u64; 2],
 }
 
-/// Who neighbors a sub-domain.
+/// The neighbors of a sub-domain.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct TopologyRow {
     /// Its rank.
@@ -228,7 +282,7 @@ pub struct TopologyRow {
     pub neighbors: Vec<NeighborRow>,
 }
 
-/// A neighbor and how many faces are shared with it.
+/// A neighbor and the number of faces shared with it.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct NeighborRow {
     /// Rank of the neighbor.
@@ -237,31 +291,31 @@ pub struct NeighborRow {
     pub faces: u64,
 }
 
-/// One step that was done.
+/// A finished step.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct JournalRow {
     /// The state of the store after it.
     pub state: StoreState,
     /// The sub-domain it was done to; `None`: the whole store.
     pub subdomain: Option<u32>,
-    /// What was done.
+    /// The name of the step.
     pub step: String,
-    /// How long it took.
+    /// Seconds it took.
     pub seconds: f64,
     /// Figures of the step.
     pub measures: Vec<Measure>,
 }
 
-/// A number worth remembering, its unit last in its name.
+/// A figure of a step.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Measure {
-    /// In `snake_case`; a unit is its last part.
+    /// In `snake_case`, with the unit last.
     pub name: String,
     /// The number.
     pub value: f64,
 }
 
-/// What a bisection had before it, and after its zone was refined.
+/// A moment of a bisection at which a mesh is kept.
 #[derive(
     Archive,
     Serialize,
@@ -277,18 +331,18 @@ pub struct Measure {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
-    /// Before it.
+    /// Before the bisection.
     Coarse,
     /// After its zone was refined.
     Refined,
 }
 
-/// A mesh on its way, kept to be looked at; it is no part of the finished mesh.
+/// A mesh kept during a bisection for pictures. Is not: a part of the finished mesh.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct StageRow {
     /// Number of the cut, from 1.
     pub cut: u32,
-    /// When it was kept.
+    /// The moment at which it was kept.
     pub stage: Stage,
     /// The plane of the cut: `normal · x = offset`.
     pub normal: [f64; 3],

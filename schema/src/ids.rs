@@ -18,7 +18,7 @@ const OWNER_SUBDOMAINS: u32 = 1 << 20;
 pub struct IdError {
     /// The text as it was given.
     pub text: String,
-    /// What was expected in its place.
+    /// The expected text.
     pub expected: &'static str,
 }
 
@@ -63,7 +63,7 @@ impl TetId {
         if local < Self::LOCAL_MAX { Some(Self { subdomain, local }) } else { None }
     }
 
-    /// Whose it is.
+    /// Its sub-domain.
     pub const fn subdomain(self) -> SubdomainId {
         self.subdomain
     }
@@ -110,7 +110,7 @@ impl FromStr for TetId {
     }
 }
 
-/// Who created a vertex, and so who numbers it.
+/// The creator of a vertex, which numbers it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Owner {
     /// The welded input.
@@ -147,7 +147,7 @@ impl Owner {
 /// A vertex, the same in every sub-domain that uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct VertexId {
-    /// Who numbers it.
+    /// The owner that numbers it.
     pub owner: Owner,
     /// Number within the owner.
     pub index: u32,

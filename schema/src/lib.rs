@@ -2,13 +2,20 @@
 #![deny(missing_docs)]
 #![doc = include_str!("../README.md")]
 
+pub mod archive;
+pub mod blob;
 pub mod catalog;
 pub mod chunk;
 pub mod code;
 pub mod digest;
 pub mod ids;
-pub mod leaf;
 pub mod page;
 pub mod record;
+pub mod row;
 pub mod source;
+pub mod topology;
+pub mod totals;
+pub mod tree;
+pub mod unsealed;
 pub mod word;
+pub mod work;

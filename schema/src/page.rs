@@ -28,14 +28,32 @@ const HEADER_SLOT: usize = RECORDS;
 pub type Slot = [u32_le; 8];
 /// A whole frame.
 pub type Frame = [Slot; SLOTS];
-/// What is stored of a frame.
+/// The stored slots of a frame.
 pub type StoredPage = [Slot; SLOTS - 1];
 
 const _: () = assert!(size_of::<Slot>() == 32 && align_of::<Slot>() == 4);
 const _: () = assert!(FRAME_BYTES == 65_536 && STORED_BYTES == 65_504);
 const _: () = assert!(STORED_BYTES + 16 <= 65_536);
 
-/// What a page holds.
+/// Position of record `id` when the slots without records are left out.
+#[inline]
+pub const fn dense(id: u32) -> u32 {
+    (id >> SLOT_BITS) * RECORDS as u32 + (id & SLOT_MASK)
+}
+
+/// The id at position `n`; inverse of [`dense`].
+#[inline]
+pub const fn sparse(n: u32) -> u32 {
+    ((n / RECORDS as u32) << SLOT_BITS) | (n % RECORDS as u32)
+}
+
+/// The id after `id`.
+#[inline]
+pub const fn next_id(id: u32) -> u32 {
+    if (id & SLOT_MASK) as usize == RECORDS - 1 { id + 3 } else { id + 1 }
+}
+
+/// The kind of records in a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 #[non_exhaustive]
@@ -66,7 +84,7 @@ pub const fn page_key(kind: PageKind, page: u32) -> u64 {
 /// Where a page belongs; a page found anywhere else is damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PageAddress {
-    /// What it holds.
+    /// Kind of its records.
     pub kind: PageKind,
     /// Rank of the sub-domain.
     pub subdomain: u32,
@@ -74,7 +92,7 @@ pub struct PageAddress {
     pub page: u32,
 }
 
-/// A stored page is not what it should be.
+/// A damaged page, or a page of another place.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum PageError {
@@ -115,7 +133,7 @@ pub fn seal_page(frame: &mut [Slot], address: PageAddress, generation: u32) {
     seal_full_page(frame, address, generation, 0);
 }
 
-/// The same for a page whose first `count` slots hold records, which its header says.
+/// Writes the header of a frame whose first `count` slots hold records, with that count.
 pub fn seal_full_page(frame: &mut [Slot], address: PageAddress, generation: u32, count: u32) {
     let version_kind = u32::from(FORMAT_VERSION) | (address.kind as u32) << 16;
     let words = [0, 0, MAGIC, version_kind, address.subdomain, address.page, generation, count];
@@ -173,7 +191,7 @@ pub fn check_page(frame: &[Slot], address: PageAddress) -> Result<u32, PageError
     Ok(header[6])
 }
 
-/// The number of records that the header of an open page tells; 0 where it tells none.
+/// The number of records in the header of an open page; 0 in a mesh that is not finished.
 pub fn page_count(frame: &[Slot]) -> u32 {
     frame[HEADER_SLOT][7].to_native()
 }
@@ -188,6 +206,19 @@ pub fn access_page(bytes: &[u8]) -> Result<&StoredPage, rkyv::rancor::Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn unused_slots_are_never_ids() {
+        for n in [0, 1, 2045, 2046, 4091, 4092, 100_000] {
+            assert_eq!(dense(sparse(n)), n);
+            assert!((sparse(n) & SLOT_MASK) < RECORDS as u32);
+        }
+        let mut id = 0;
+        for n in 0..10_000 {
+            assert_eq!(id, sparse(n));
+            id = next_id(id);
+        }
+    }
 
     #[test]
     fn a_page_comes_back_and_any_flipped_bit_is_found() {

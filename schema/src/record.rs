@@ -1,11 +1,11 @@
-//! Records as plain values: what a working slot or a line of a sealed chunk means.
+//! Records as plain values, of working slots and of sealed chunks.
 
 use crate::ids::{SubdomainId, VertexId};
 use crate::page::{NONE, Slot, u32_le};
 
 /// A tetrahedron of a working page, as stored: marks and required bits are still in the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Tet {
+pub struct WorkingTet {
     /// Vertex ids with the required bits of the faces and the mark of the tetrahedron.
     pub node: [u32; 4],
     /// Face references across the four faces.
@@ -17,24 +17,24 @@ pub struct Tet {
 pub struct TetAttribute {
     /// Number of its region.
     pub region: u32,
-    /// Bits; what they mean is the mesher's.
+    /// Bits of the mesher; bit 0: frozen.
     pub flags: u32,
 }
 
 /// A vertex of a working page.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vertex {
+pub struct WorkingVertex {
     /// Position.
     pub point: [f64; 3],
-    /// Wanted edge length; 0 where it is not yet known.
+    /// Wanted edge length; 0 if not yet computed.
     pub h: f32,
     /// A tetrahedron that has the vertex, or [`NONE`].
     pub v2t: u32,
 }
 
 /// A facet of a working page.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Facet {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct WorkingFacet {
     /// Vertex ids in the order of the input triangle.
     pub vertices: [u32; 3],
     /// Number of its label.
@@ -45,14 +45,14 @@ pub struct Facet {
     pub regions: [u32; 2],
 }
 
-impl Tet {
+impl WorkingTet {
     /// The words of a slot.
     pub fn from_slot(slot: &Slot) -> Self {
         let [a, b, c, d, e, f, g, h] = slot.map(u32_le::to_native);
         Self { node: [a, b, c, d], neighbor: [e, f, g, h] }
     }
 
-    /// The inverse of [`Tet::from_slot`].
+    /// The inverse of [`WorkingTet::from_slot`].
     pub fn to_slot(self) -> Slot {
         let ([a, b, c, d], [e, f, g, h]) = (self.node, self.neighbor);
         [a, b, c, d, e, f, g, h].map(u32_le::from_native)
@@ -66,7 +66,7 @@ impl TetAttribute {
     }
 }
 
-impl Vertex {
+impl WorkingVertex {
     /// The words of a slot.
     pub fn from_slot(slot: &Slot) -> Self {
         let w = slot.map(u32_le::to_native);
@@ -74,14 +74,14 @@ impl Vertex {
         Self { point: [axis(0), axis(2), axis(4)], h: f32::from_bits(w[6]), v2t: w[7] }
     }
 
-    /// The inverse of [`Vertex::from_slot`].
+    /// The inverse of [`WorkingVertex::from_slot`].
     pub fn to_slot(self) -> Slot {
         let [x, y, z] = self.point.map(|c| [c.to_bits() as u32, (c.to_bits() >> 32) as u32]);
         [x[0], x[1], y[0], y[1], z[0], z[1], self.h.to_bits(), self.v2t].map(u32_le::from_native)
     }
 }
 
-impl Facet {
+impl WorkingFacet {
     /// The words of a slot.
     pub fn from_slot(slot: &Slot) -> Self {
         let w = slot.map(u32_le::to_native);
@@ -93,7 +93,7 @@ impl Facet {
         }
     }
 
-    /// The inverse of [`Facet::from_slot`].
+    /// The inverse of [`WorkingFacet::from_slot`].
     pub fn to_slot(self) -> Slot {
         let [a, b, c] = self.vertices;
         let triangle = [self.triangle as u32, (self.triangle >> 32) as u32];
@@ -129,7 +129,7 @@ impl SealedTet {
         }
         let [a, b, c, d] = LEAD[lead];
         let [a, b, c, d] = [n[a], n[b], n[c], n[d]];
-        // Which of three comes first is as good as random: looked up, not guessed.
+        // The order of the three is as good as random: a table avoids mispredicted branches.
         let nodes = [[a, b, c, d], [a, c, d, b], [a, d, b, c]];
         let later = usize::from(b >= c) | usize::from(b >= d);
         let nodes = nodes[later * (1 + usize::from(c >= d))];
@@ -140,7 +140,7 @@ impl SealedTet {
 /// A tetrahedron of a coarse snapshot, the working mesh a sub-domain is meshed from; its number is its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct CoarseTet {
-    /// Vertex numbers in the leaf, in the working mesh's order.
+    /// Vertex numbers in the snapshot, in the working mesh's order.
     pub nodes: [u32; 4],
     /// Bits 0..4: face i is required. Bits 4..8: the mark of node i.
     pub bits: u8,
@@ -170,11 +170,11 @@ pub struct CoarseFace {
     pub cut: u32,
     /// Number of the face in the cut.
     pub index: u32,
-    /// 0: the leaf is on the cut's low side, 1: on the high side.
+    /// Side of the cut where the snapshot is: 0 low, 1 high.
     pub side: u32,
 }
 
-/// What a vertex is to the mesh.
+/// Tags of vertices.
 pub mod tag {
     /// Added inside; may move and vanish.
     pub const FREE: u32 = 0;
@@ -189,7 +189,7 @@ pub mod tag {
 }
 
 /// A vertex of a sealed sub-domain; its number is its place.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct SealedVertex {
     /// Position.
     pub point: [f64; 3],
@@ -197,7 +197,7 @@ pub struct SealedVertex {
     pub h: f32,
     /// One of [`tag`].
     pub tag: u32,
-    /// Its name for ever, as [`VertexId::number`].
+    /// Its lasting name, as [`VertexId::number`].
     pub id: u64,
 }
 
@@ -209,7 +209,7 @@ impl SealedVertex {
 }
 
 /// An input triangle that appears in a sealed sub-domain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct SealedFacet {
     /// Vertex numbers in the sub-domain, in the order of the input triangle.
     pub vertices: [u32; 3],
@@ -224,7 +224,7 @@ pub struct SealedFacet {
 }
 
 /// A face of a sealed sub-domain shared with another one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct InterfaceFace {
     /// Vertex numbers in this sub-domain, counter-clockwise seen from outside it.
     pub vertices: [u32; 3],
@@ -248,9 +248,9 @@ mod tests {
     #[test]
     fn slots_and_records_are_the_same_thing() {
         let slot: Slot = std::array::from_fn(|i| u32_le::from_native(0x4100_0000 + 77 * i as u32));
-        assert_eq!(Tet::from_slot(&slot).to_slot(), slot);
-        assert_eq!(Vertex::from_slot(&slot).to_slot(), slot);
-        assert_eq!(Facet::from_slot(&slot).to_slot(), slot);
+        assert_eq!(WorkingTet::from_slot(&slot).to_slot(), slot);
+        assert_eq!(WorkingVertex::from_slot(&slot).to_slot(), slot);
+        assert_eq!(WorkingFacet::from_slot(&slot).to_slot(), slot);
         assert_eq!(TetAttribute::from_slot(&slot, 1).region, slot[2].to_native());
     }
 

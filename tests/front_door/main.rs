@@ -192,8 +192,7 @@ fn a_store_of_another_recipe_is_not_gone_on_with() -> Outcome {
     assert!(begun.create(&path).is_err());
     let mut catalog = Catalog::open_writable(&path)?;
     catalog.commit(|step| {
-        // The blob of the recipe's version.
-        step.set_blob(2, &99u32.to_le_bytes());
+        step.set_blob(tetdb_schema::blob::Blob::Recipe, &99u32.to_le_bytes());
         Ok(())
     })?;
     catalog.close()?;

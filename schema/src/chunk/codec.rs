@@ -5,19 +5,19 @@ use std::marker::PhantomData;
 use xxhash_rust::xxh3::xxh3_64;
 use zstd::bulk::{Compressor, Decompressor};
 
-use super::columns::{Columns, Reader};
+use super::columns::{ColumnReader, ColumnWriter};
 use super::{CHUNK_BYTES_MAX, ChunkAddress, ChunkDamage, ChunkError, ChunkRecord, HEAD_BYTES};
 use crate::page::FORMAT_VERSION;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"TETC");
 /// Level 3 saves 0.3 % more and takes 1.4 times as long.
 const LEVEL: i32 = 1;
-/// Room that a payload's dictionaries and lengths may take beside its records.
+/// Bytes that dictionaries and lengths of a payload may take in addition to its records.
 const RAW_SLACK: usize = 32 * 1024;
 
 /// Encodes chunks of one kind of record.
 pub struct Encoder<R> {
-    columns: Columns,
+    columns: ColumnWriter,
     value: Vec<u8>,
     zstd: Compressor<'static>,
     record: PhantomData<R>,
@@ -29,7 +29,7 @@ impl<R: ChunkRecord> Encoder<R> {
     /// Errors: zstd cannot allocate its context.
     pub fn new() -> std::io::Result<Self> {
         Ok(Self {
-            columns: Columns::default(),
+            columns: ColumnWriter::default(),
             value: Vec::new(),
             zstd: Compressor::new(LEVEL)?,
             record: PhantomData,
@@ -38,8 +38,8 @@ impl<R: ChunkRecord> Encoder<R> {
 
     /// The value to store for `records`, the first of which has number `first`.
     ///
-    /// It may be longer than [`CHUNK_BYTES_MAX`]: then it cannot be stored and fewer records are wanted.
-    /// Errors: those of zstd, which knows none for a buffer of sufficient length.
+    /// A value longer than [`CHUNK_BYTES_MAX`] cannot be stored: the caller tries fewer records.
+    /// Errors: those of zstd, which has none for a buffer of sufficient length.
     pub fn encode(
         &mut self,
         address: ChunkAddress,
@@ -130,14 +130,14 @@ impl<R: ChunkRecord> Decoder<R> {
         if unpacked.ok() != Some(raw as usize) {
             return Err(ChunkDamage::Compression);
         }
-        let mut columns = Reader::new(&self.raw);
+        let mut columns = ColumnReader::new(&self.raw);
         R::decode(&mut columns, first, count, records)?;
         columns.finish()?;
         Ok(first)
     }
 }
 
-/// Checks everything a head says; returns first, count and raw bytes.
+/// Checks all of a head; returns first, count and raw bytes.
 fn read_head<R: ChunkRecord>(value: &[u8], address: ChunkAddress) -> Result<[u32; 3], ChunkDamage> {
     if !(HEAD_BYTES..=CHUNK_BYTES_MAX).contains(&value.len()) {
         return Err(ChunkDamage::Length { found: value.len() });

@@ -9,7 +9,7 @@ pub struct Malformed(pub &'static str);
 
 /// Columns under construction, one after the other.
 #[derive(Default)]
-pub struct Columns {
+pub struct ColumnWriter {
     pub(super) bytes: Vec<u8>,
 }
 
@@ -39,7 +39,7 @@ pub(super) const fn unzigzag64(z: u64, base: u64) -> u64 {
     base.wrapping_add(z >> 1 ^ (z & 1).wrapping_neg())
 }
 
-impl Columns {
+impl ColumnWriter {
     /// One number, seven bits a byte, low bits first.
     #[inline]
     pub fn varint(&mut self, mut v: u64) {
@@ -48,12 +48,6 @@ impl Columns {
             v >>= 7;
         }
         self.bytes.push(v as u8);
-    }
-
-    /// A column of varints.
-    #[inline]
-    pub fn varints32(&mut self, values: impl Iterator<Item = u32>) {
-        values.for_each(|v| self.varint(u64::from(v)));
     }
 
     /// Bytes as they are.
@@ -120,12 +114,12 @@ const DICTIONARY: u8 = 0;
 const DIFFERENCES: u8 = 1;
 
 /// Columns being read, in the order they were written.
-pub struct Reader<'a> {
+pub struct ColumnReader<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> ColumnReader<'a> {
     /// Starts at the first column.
     pub(super) fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, at: 0 }
@@ -192,7 +186,7 @@ impl<'a> Reader<'a> {
         Ok(values)
     }
 
-    /// The inverse of [`Columns::planes32`]; fills `values`.
+    /// The inverse of [`ColumnWriter::planes32`]; fills `values`.
     pub fn planes32(&mut self, values: &mut [u32]) -> Result<(), Malformed> {
         let width = self.raw(1)?[0];
         if !(1..=4).contains(&width) {
@@ -210,7 +204,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The inverse of [`Columns::dictionary`]: calls `set` with each record's place and value.
+    /// The inverse of [`ColumnWriter::dictionary`]: calls `set` with each record's place and value.
     pub fn dictionary(
         &mut self,
         count: usize,

@@ -1,24 +1,21 @@
 //! Sealed chunks: records of one kind, differences and varints, zstd, a checksummed head.
 //!
 //! [`Packer`] cuts a stream of records into well filled chunks, [`Encoder`] and [`Decoder`] do one chunk.
-//! A decoder meets whatever a disk returns: it answers damage with an error, never with a panic, and
-//! allocates nothing that the head's checked count does not justify.
+//! A decoder reads whatever a disk returns. Damage is an error, never a panic, and the checked count of the head bounds what
+//! is allocated.
 
-mod coarse;
 mod codec;
+mod column;
 mod columns;
-mod facets;
 mod packer;
-mod steps;
+mod records;
 mod summaries;
 #[cfg(test)]
 mod tests;
-mod tets;
-mod vertices;
 
 pub use codec::{Decoder, Encoder};
-pub use columns::{Columns, Malformed};
-pub use packer::{Packed, Packer};
+pub use columns::{ColumnWriter, Malformed};
+pub use packer::{PackedChunk, Packer};
 pub use summaries::{RangeSummary, TetSummary, VertexSummary, is_box};
 
 use thiserror::Error;
@@ -30,7 +27,7 @@ pub const HEAD_BYTES: usize = 48;
 
 const _: () = assert!(CHUNK_BYTES_MAX + 16 <= 65_536);
 
-/// What a chunk holds.
+/// The kind of records in a chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 #[non_exhaustive]
@@ -71,7 +68,7 @@ impl ChunkKind {
 /// Where a chunk belongs; a chunk found anywhere else is damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChunkAddress {
-    /// What it holds.
+    /// Kind of its records.
     pub kind: ChunkKind,
     /// Rank of the sub-domain.
     pub subdomain: u32,
@@ -88,17 +85,17 @@ impl ChunkAddress {
     }
 }
 
-/// A stored chunk is not what it should be.
+/// A damaged chunk, or a chunk of another place.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("sub-domain {}, {:?} chunk {}: {reason}", address.subdomain, address.kind, address.chunk)]
 pub struct ChunkError {
     /// Where the chunk belongs.
     pub address: ChunkAddress,
-    /// What is wrong with it.
+    /// The damage.
     pub reason: ChunkDamage,
 }
 
-/// What is wrong with a chunk.
+/// Damage of a chunk.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ChunkDamage {
@@ -144,10 +141,10 @@ pub trait ChunkRecord: Copy {
     const RAW_BYTES_MAX: usize;
 
     /// Appends the columns of `records`, the first of which has number `first`.
-    fn encode(records: &[Self], first: u32, columns: &mut Columns);
+    fn encode(records: &[Self], first: u32, columns: &mut ColumnWriter);
     /// Reads back `count` records.
     fn decode(
-        columns: &mut columns::Reader<'_>,
+        columns: &mut columns::ColumnReader<'_>,
         first: u32,
         count: usize,
         records: &mut Vec<Self>,

@@ -1,12 +1,12 @@
 //! Cuts a stream of records into chunks that fill their place in the database.
 //!
-//! redb stores a large value in a room of 4096 * 2^k bytes, so a chunk of half the size costs as much
-//! as a full one. How many records fit is only known after compressing; the packer guesses from the
-//! chunk before and tries again when it missed. The result depends on the records alone.
+//! redb stores a large value in 4096 * 2^k bytes, so a chunk of half the size costs as much as a full one. The number of records
+//! that fit is known only after compressing. The packer guesses it from the chunk before and tries again after a miss. The result
+//! depends on the records alone.
 
 use super::{CHUNK_BYTES_MAX, ChunkAddress, ChunkRecord, Encoder};
 
-/// What the guess aims at. Higher: more chunks overflow and are encoded again; lower: room is wasted.
+/// The fill that the guess aims at. Higher: more chunks overflow and are encoded again. Lower: bytes are wasted.
 /// With 0.98 the chunks of a random Delaunay mesh come out 0.976 to 0.978 full.
 const FILL_AIM: f64 = 0.98;
 /// A chunk below this is tried again with more records, when there are some.
@@ -17,7 +17,7 @@ const GROWTH_ATTEMPTS: u32 = 2;
 const RECORD_BYTES_GUESS: usize = 8;
 
 /// A chunk ready to be stored, and the records in it.
-pub struct Packed<R> {
+pub struct PackedChunk<R> {
     /// Where it belongs.
     pub address: ChunkAddress,
     /// Number of its first record in the sub-domain.
@@ -65,7 +65,7 @@ impl<R: ChunkRecord> Packer<R> {
     ///
     /// Errors: those of zstd.
     #[inline]
-    pub fn push(&mut self, record: R) -> std::io::Result<Option<Packed<R>>> {
+    pub fn push(&mut self, record: R) -> std::io::Result<Option<PackedChunk<R>>> {
         self.pending.push(record);
         // More than the guess, so that a chunk that came out short can grow.
         if self.pending.len() < (self.guess + self.guess / 8).min(R::COUNT_MAX) {
@@ -77,12 +77,12 @@ impl<R: ChunkRecord> Packer<R> {
     /// Cuts the next chunk from what is left; `None` when nothing is.
     ///
     /// Errors: those of zstd.
-    pub fn cut(&mut self) -> std::io::Result<Option<Packed<R>>> {
+    pub fn cut(&mut self) -> std::io::Result<Option<PackedChunk<R>>> {
         self.cut_some(true)
     }
 
     #[inline(never)]
-    fn cut_some(&mut self, last: bool) -> std::io::Result<Option<Packed<R>>> {
+    fn cut_some(&mut self, last: bool) -> std::io::Result<Option<PackedChunk<R>>> {
         let most = self.pending.len().min(R::COUNT_MAX);
         if most == 0 {
             return Ok(None);
@@ -120,11 +120,11 @@ impl<R: ChunkRecord> Packer<R> {
         }
     }
 
-    /// Takes the first `n` records, whose value the encoder made last.
-    fn take(&mut self, n: usize) -> Packed<R> {
+    /// Takes the first `n` records, whose value the encoder wrote last.
+    fn take(&mut self, n: usize) -> PackedChunk<R> {
         let records: Vec<R> = self.pending.drain(..n).collect();
         let value = self.encoder.last_value().to_vec();
-        let packed = Packed { address: self.address, first: self.first, value, records };
+        let packed = PackedChunk { address: self.address, first: self.first, value, records };
         self.first += n as u32;
         self.address.chunk += 1;
         packed

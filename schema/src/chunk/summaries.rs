@@ -1,6 +1,6 @@
-//! Summaries: what a reader wants to know of a chunk before it decodes it.
+//! Summaries of chunks: boxes, ranges and counts that tell a reader which chunks to skip.
 
-use super::columns::{Columns, Malformed, Reader};
+use super::columns::{ColumnReader, ColumnWriter, Malformed};
 use super::{ChunkKind, ChunkRecord};
 
 /// Of a chunk of tetrahedra; 128 bytes.
@@ -18,7 +18,7 @@ pub struct TetSummary {
     pub vertices: [u32; 2],
     /// Number of the first record.
     pub first: u32,
-    /// How many records there are.
+    /// Number of records.
     pub count: u32,
     /// Faces without a partner in the chunk: shared with other chunks or on the boundary.
     pub open_faces: u32,
@@ -35,9 +35,9 @@ pub struct VertexSummary {
     pub bounds: [[f64; 3]; 2],
     /// Number of the first record.
     pub first: u32,
-    /// How many records there are.
+    /// Number of records.
     pub count: u32,
-    /// Which cells of the box, divided in four along each axis, have vertices: bit x + 4 y + 16 z. 0: not known.
+    /// Cells of the box, divided in four along each axis, have vertices: bit x + 4 y + 16 z. 0: not known.
     pub cells: u64,
 }
 
@@ -46,129 +46,106 @@ pub struct VertexSummary {
 pub struct RangeSummary<const INTERFACE: bool> {
     /// Number of the first record.
     pub first: u32,
-    /// How many records there are.
+    /// Number of records.
     pub count: u32,
 }
 
-/// Takes fixed-width numbers from the front.
-struct Fields<'a>(&'a [u8]);
+/// A number, or an array of them, of fixed width and little-endian.
+trait Fixed: Sized {
+    fn put(&self, bytes: &mut Vec<u8>);
+    /// Takes it from the front.
+    fn take(bytes: &mut &[u8]) -> Self;
+}
 
-impl Fields<'_> {
-    fn take<const N: usize>(&mut self) -> [u8; N] {
-        let (head, rest) = self.0.split_at(N);
-        self.0 = rest;
-        head.try_into().expect("N bytes were split off")
-    }
-    fn u32(&mut self) -> u32 {
-        u32::from_le_bytes(self.take())
-    }
-    fn f32(&mut self) -> f32 {
-        f32::from_le_bytes(self.take())
-    }
-    fn f64(&mut self) -> f64 {
-        f64::from_le_bytes(self.take())
-    }
-    /// Errors: a box that holds nothing.
-    fn bounds(&mut self) -> Result<[[f64; 3]; 2], Malformed> {
-        let bounds = [(); 2].map(|()| [(); 3].map(|()| self.f64()));
-        match is_box(&bounds) {
-            true => Ok(bounds),
-            false => Err(Malformed("a box is inverted or has no finite corners")),
+macro_rules! fixed_numbers {
+    ($($number:ty)+) => {$(
+        impl Fixed for $number {
+            fn put(&self, bytes: &mut Vec<u8>) {
+                bytes.extend(self.to_le_bytes());
+            }
+            fn take(bytes: &mut &[u8]) -> Self {
+                let (head, rest) = bytes.split_first_chunk().expect("fields fit into the width");
+                *bytes = rest;
+                Self::from_le_bytes(*head)
+            }
         }
+    )+};
+}
+fixed_numbers!(u32 u64 f32 f64);
+
+impl<T: Fixed, const N: usize> Fixed for [T; N] {
+    fn put(&self, bytes: &mut Vec<u8>) {
+        self.iter().for_each(|t| t.put(bytes));
     }
-    /// The rest is reserved and zero.
-    fn finish(self) -> Result<(), Malformed> {
-        if self.0.iter().all(|&b| b == 0) {
-            Ok(())
-        } else {
-            Err(Malformed("a reserved byte is not zero"))
-        }
+    fn take(bytes: &mut &[u8]) -> Self {
+        std::array::from_fn(|_| T::take(bytes))
     }
 }
 
-/// Whether a box has finite corners, the low one first.
+/// Both directions of a summary: its fields in order, then zeros up to its width. The given function checks a summary that was read.
+macro_rules! fixed_fields {
+    ($check:expr; $($field:ident),+) => {
+        const RAW_BYTES_MAX: usize = Self::BYTES;
+
+        fn encode(records: &[Self], _first: u32, columns: &mut ColumnWriter) {
+            for summary in records {
+                let end = columns.bytes.len() + Self::BYTES;
+                $(summary.$field.put(&mut columns.bytes);)+
+                columns.bytes.resize(end, 0);
+            }
+        }
+
+        fn decode(
+            columns: &mut ColumnReader<'_>,
+            _first: u32,
+            count: usize,
+            records: &mut Vec<Self>,
+        ) -> Result<(), Malformed> {
+            for _ in 0..count {
+                let mut bytes = columns.raw(Self::BYTES)?;
+                let summary = Self { $($field: Fixed::take(&mut bytes)),+ };
+                if bytes.iter().any(|&b| b != 0) {
+                    return Err(Malformed("a reserved byte is not zero"));
+                }
+                if !$check(&summary) {
+                    return Err(Malformed("a summary that no chunk can have"));
+                }
+                records.push(summary);
+            }
+            Ok(())
+        }
+    };
+}
+
+/// True if a box has finite corners, the low one first.
 pub fn is_box([low, high]: &[[f64; 3]; 2]) -> bool {
     let ends = low.iter().zip(high);
     ends.into_iter().all(|(low, high)| low.is_finite() && high.is_finite() && low <= high)
-}
-
-fn pad(columns: &mut Columns, start: usize, width: usize) {
-    columns.bytes.resize(start + width, 0);
-}
-
-fn put_bounds(columns: &mut Columns, bounds: &[[f64; 3]; 2]) {
-    for c in bounds.as_flattened() {
-        columns.raw(&c.to_le_bytes());
-    }
 }
 
 impl TetSummary {
     /// Bytes of a summary.
     pub const BYTES: usize = 128;
 
-    /// Whether some chunk can have it.
-    fn check(&self) -> Result<(), Malformed> {
+    /// True if some chunk can have it.
+    fn is_sound(&self) -> bool {
         let [least, most] = self.quality;
-        let is_sound = least <= most
+        is_box(&self.bounds)
+            && least <= most
             && self.regions[0] <= self.regions[1]
             && self.vertices[0] <= self.vertices[1]
             && self.edge_max >= 0.0
             && !self.volume.is_nan()
-            && self.count > 0;
-        match is_sound {
-            true => Ok(()),
-            false => Err(Malformed("a summary that no chunk can have")),
-        }
+            && self.count > 0
     }
 }
 
 impl ChunkRecord for TetSummary {
     const KIND: ChunkKind = ChunkKind::TetSummaries;
     const COUNT_MAX: usize = 2048;
-    const RAW_BYTES_MAX: usize = Self::BYTES;
-
-    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
-        for s in records {
-            let start = columns.bytes.len();
-            put_bounds(columns, &s.bounds);
-            columns.raw(&s.volume.to_le_bytes());
-            for q in s.quality {
-                columns.raw(&q.to_le_bytes());
-            }
-            let [[r0, r1], [v0, v1]] = [s.regions, s.vertices];
-            for word in [r0, r1, v0, v1, s.first, s.count, s.open_faces, s.bytes] {
-                columns.raw(&word.to_le_bytes());
-            }
-            columns.raw(&s.edge_max.to_le_bytes());
-            pad(columns, start, Self::BYTES);
-        }
-    }
-
-    fn decode(
-        columns: &mut Reader<'_>,
-        _first: u32,
-        count: usize,
-        records: &mut Vec<Self>,
-    ) -> Result<(), Malformed> {
-        for _ in 0..count {
-            let mut f = Fields(columns.raw(Self::BYTES)?);
-            let summary = Self {
-                bounds: f.bounds()?,
-                volume: f.f64(),
-                quality: [f.f32(), f.f32()],
-                regions: [f.u32(), f.u32()],
-                vertices: [f.u32(), f.u32()],
-                first: f.u32(),
-                count: f.u32(),
-                open_faces: f.u32(),
-                bytes: f.u32(),
-                edge_max: f.f32(),
-            };
-            f.finish()?;
-            summary.check()?;
-            records.push(summary);
-        }
-        Ok(())
+    fixed_fields! {
+        Self::is_sound;
+        bounds, volume, quality, regions, vertices, first, count, open_faces, bytes, edge_max
     }
 }
 
@@ -212,37 +189,7 @@ impl VertexSummary {
 impl ChunkRecord for VertexSummary {
     const KIND: ChunkKind = ChunkKind::VertexSummaries;
     const COUNT_MAX: usize = 4096;
-    const RAW_BYTES_MAX: usize = Self::BYTES;
-
-    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
-        for s in records {
-            let start = columns.bytes.len();
-            put_bounds(columns, &s.bounds);
-            columns.raw(&s.first.to_le_bytes());
-            columns.raw(&s.count.to_le_bytes());
-            columns.raw(&s.cells.to_le_bytes());
-            debug_assert_eq!(columns.bytes.len(), start + Self::BYTES);
-        }
-    }
-
-    fn decode(
-        columns: &mut Reader<'_>,
-        _first: u32,
-        count: usize,
-        records: &mut Vec<Self>,
-    ) -> Result<(), Malformed> {
-        for _ in 0..count {
-            let mut f = Fields(columns.raw(Self::BYTES)?);
-            records.push(Self {
-                bounds: f.bounds()?,
-                first: f.u32(),
-                count: f.u32(),
-                cells: u64::from_le_bytes(f.take()),
-            });
-            f.finish()?;
-        }
-        Ok(())
-    }
+    fixed_fields! { |summary: &Self| is_box(&summary.bounds); bounds, first, count, cells }
 }
 
 impl<const INTERFACE: bool> RangeSummary<INTERFACE> {
@@ -254,28 +201,5 @@ impl<const INTERFACE: bool> ChunkRecord for RangeSummary<INTERFACE> {
     const KIND: ChunkKind =
         if INTERFACE { ChunkKind::InterfaceSummaries } else { ChunkKind::FacetSummaries };
     const COUNT_MAX: usize = 16_384;
-    const RAW_BYTES_MAX: usize = Self::BYTES;
-
-    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
-        for s in records {
-            let start = columns.bytes.len();
-            columns.raw(&s.first.to_le_bytes());
-            columns.raw(&s.count.to_le_bytes());
-            pad(columns, start, Self::BYTES);
-        }
-    }
-
-    fn decode(
-        columns: &mut Reader<'_>,
-        _first: u32,
-        count: usize,
-        records: &mut Vec<Self>,
-    ) -> Result<(), Malformed> {
-        for _ in 0..count {
-            let mut f = Fields(columns.raw(Self::BYTES)?);
-            records.push(Self { first: f.u32(), count: f.u32() });
-            f.finish()?;
-        }
-        Ok(())
-    }
+    fixed_fields! { |_: &Self| true; first, count }
 }

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::record::{
-    CoarseFace, CoarseTet, CoarseVertex, Facet, InterfaceFace, SealedFacet, SealedTet, SealedVertex,
+    CoarseFace, CoarseTet, CoarseVertex, InterfaceFace, SealedFacet, SealedTet, SealedVertex,
+    WorkingFacet,
 };
 
 /// Deterministic pseudo-random numbers.
@@ -95,9 +96,9 @@ fn coarse_vertices(n: u32) -> Vec<CoarseVertex> {
         .collect()
 }
 
-fn coarse_facets(n: u32) -> Vec<Facet> {
+fn coarse_facets(n: u32) -> Vec<WorkingFacet> {
     (facets(n).into_iter())
-        .map(|f| Facet {
+        .map(|f| WorkingFacet {
             vertices: f.vertices,
             label: f.label,
             triangle: f.triangle,
@@ -112,7 +113,7 @@ fn coarse_faces(n: u32) -> Vec<CoarseFace> {
         .collect()
 }
 
-fn pack<R: ChunkRecord>(records: &[R]) -> Vec<Packed<R>> {
+fn pack<R: ChunkRecord>(records: &[R]) -> Vec<PackedChunk<R>> {
     let mut packer = Packer::new(5, 2).expect("a zstd context");
     let mut chunks = Vec::new();
     for &r in records {
@@ -211,7 +212,7 @@ fn damage<R: ChunkRecord>(records: &[R]) {
         if round % 2 == 0 {
             raw.iter_mut().for_each(|b| *b &= 0x81);
         }
-        let mut columns = columns::Reader::new(&raw);
+        let mut columns = columns::ColumnReader::new(&raw);
         some.clear();
         let count = next() as usize % 500;
         let _ = R::decode(&mut columns, u32::MAX - 400, count, &mut some);

@@ -11,7 +11,7 @@ use super::preflight::scratch_beside;
 use super::verify_shared::{Job, fingerprint, options};
 use super::{Error, Settings};
 use crate::api;
-use crate::pipeline::{Kind, from_bytes, to_bytes};
+use crate::pipeline::{WorkKind, from_bytes, to_bytes};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{DiskPath, attempt};
 use tetdb_base::surface::Surface;
@@ -30,7 +30,7 @@ pub struct Server {
 impl Server {
     /// `None` where `job` is no verification. Effects: the surface is read. Errors: it is not the one that is compared with.
     pub fn begin(job: &[u8], settings: &Settings) -> Option<Result<Self, Error>> {
-        let job: Job = from_bytes(Kind::Verification, job).ok()?;
+        let job: Job = from_bytes(WorkKind::Verification, job).ok()?;
         Some(Self::with(job, settings))
     }
 
@@ -54,7 +54,7 @@ impl Server {
 
     /// Looks at one sub-domain. Errors: damage; the disk; an order that cannot be read.
     pub fn perform(&self, order: &[u8]) -> Result<Vec<u8>, Error> {
-        let row: SubdomainRow = from_bytes(Kind::PartOrder, order).map_err(Error::internal)?;
+        let row: SubdomainRow = from_bytes(WorkKind::PartOrder, order).map_err(Error::internal)?;
         let found = attempt(|| {
             let name = Catalog::file_name(row.rank, row.generation);
             let path = DiskPath::from(Path::new(&self.job.store)).join(name);
@@ -63,7 +63,7 @@ impl Server {
             audit::verify_part(&mut part, apex, self.surface.as_ref(), &self.options)
         });
         let found = found.map_err(StoreError::from).flatten()?;
-        Ok(to_bytes(Kind::PartReport, &found))
+        Ok(to_bytes(WorkKind::PartReport, &found))
     }
 }
 

@@ -11,7 +11,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::Settings;
 use crate::pipeline::{
-    Hand, Helpers, Kind, PipelineError, Watcher, from_bytes, to_bytes, work_off,
+    Hand, Helpers, PipelineError, Watcher, WorkKind, from_bytes, to_bytes, work_off,
 };
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{attempt, n_threads};
@@ -72,7 +72,7 @@ pub(super) fn verify(
             surface: surface.map(|s| (sources.clone(), fingerprint(s))),
         };
         let slots = helpers.as_ref().map_or(0, |helpers| {
-            let begun = helpers.begin(&to_bytes(Kind::Verification, &job()));
+            let begun = helpers.begin(&to_bytes(WorkKind::Verification, &job()));
             begun.unwrap_or_else(|failure| {
                 settings.note(format!("note: verified by one process: {}", failure.message));
                 0
@@ -134,8 +134,8 @@ fn share(
 
 /// Has a sub-domain looked at by a helper. Errors: in words.
 fn ask(helpers: &dyn Helpers, slot: usize, row: &SubdomainRow) -> Result<PartReport, String> {
-    let answer = helpers.perform(slot, to_bytes(Kind::PartOrder, row));
-    from_bytes(Kind::PartReport, &answer.map_err(|e| e.message)?)
+    let answer = helpers.perform(slot, to_bytes(WorkKind::PartOrder, row));
+    from_bytes(WorkKind::PartReport, &answer.map_err(|e| e.message)?)
 }
 
 /// Of all that a mesh is compared with.

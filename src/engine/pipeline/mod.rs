@@ -41,6 +41,6 @@ pub use tasks::{
     Gathered, Performed, Planned, Stage, StageKind, TASKS_MAX, TaskSettings, TaskState, end_plan,
     gather, is_being_worked, perform, plan as plan_tasks, status,
 };
+pub use tetdb_schema::work::{WorkKind, from_bytes, to_bytes};
 pub use work::{FineReport, Hands, Helpers, stage_faces};
-pub use work::{Kind, from_bytes, to_bytes};
 pub use workers::{Hand, work_off};

@@ -7,6 +7,7 @@
 use super::surface::{CuttingSurface, Plane};
 use crate::refine::PlacementRule;
 use tetdb_base::geom::{Point, mix};
+use tetdb_schema::tree::CutPlane;
 
 /// Half the width of the zone at its narrowest, in units of the wanted length. Circumspheres of a saturated mesh have radii below
 /// 1.03 h, and interface vertices stay within 1.4 h: from 3.5 on no later vertex reaches a tetrahedron at the interface.
@@ -23,6 +24,19 @@ pub struct Zone {
     pub cut: u32,
     /// The plane in the middle of the zone.
     pub surface: Plane,
+}
+
+impl From<Zone> for CutPlane {
+    fn from(zone: Zone) -> Self {
+        let [x, y, z] = zone.surface.normal.to_array();
+        Self { cut: zone.cut, plane: [x, y, z, zone.surface.offset] }
+    }
+}
+
+impl From<CutPlane> for Zone {
+    fn from(CutPlane { cut, plane: [x, y, z, offset] }: CutPlane) -> Self {
+        Self { cut, surface: Plane { normal: Point::new(x, y, z), offset } }
+    }
 }
 
 impl Zone {

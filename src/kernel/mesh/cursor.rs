@@ -1,10 +1,12 @@
 //! The working mesh of one sub-domain, read and changed record by record through its pages.
 
-use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, Slot, u32_le};
+use tetdb_schema::page::{
+    NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, Slot, dense, next_id, sparse, u32_le,
+};
+use tetdb_schema::tree::{IdCounts, MeshState};
 
 use super::anatomy::mark::IN_CAVITY;
 use super::anatomy::{FaceRef, MARK, REQUIRED, Tet, VERTEX_MASK};
-use super::state::{IdPool, MeshState, dense, next_id, sparse};
 use tetdb_base::storage::{Pager, Pages, SharedPages, StorageError, kind, raise};
 
 /// Cursor over one sub-domain's paged arrays: tetrahedra, vertices, their attributes, facets.
@@ -111,7 +113,7 @@ impl<P: Pages> Mesh<P> {
     #[inline]
     pub(super) fn take_id<const K: usize>(
         pages: &mut P,
-        pool: &mut IdPool,
+        pool: &mut IdCounts,
         what: &'static str,
     ) -> u32 {
         pool.n_live += 1;
@@ -222,7 +224,7 @@ impl<P: Pages> Mesh<P> {
     /// Takes the ids of `n` tetrahedra of a mesh that has none; each is then to be placed once, in any order.
     pub fn take_tets(&mut self, n: u32) {
         debug_assert_eq!(self.state.tets.fresh, 0);
-        self.state.tets = IdPool { fresh: sparse(n), free_head: NONE, n_live: n };
+        self.state.tets = IdCounts::without_gaps(n);
     }
 
     /// Writes a tetrahedron whose id was taken by [`Mesh::take_tets`], or is to lie behind all.

@@ -3,7 +3,7 @@
 use tetdb_schema::page::u32_le;
 
 use super::cursor::Mesh;
-use super::state::sparse;
+use super::sparse;
 use tetdb_base::storage::{Pages, kind};
 
 /// A triangle of the input (or of an interface) and the regions on its two sides.

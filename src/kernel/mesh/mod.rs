@@ -7,7 +7,6 @@ mod renumber;
 mod scan;
 mod snapshot;
 mod speculation;
-mod state;
 mod vertices;
 
 pub use anatomy::{FaceRef, Tet};
@@ -16,5 +15,6 @@ pub use faces::{MeshFacet, MeshInterfaceFace, SHEET};
 pub use renumber::{Workspace, renumber};
 pub use scan::{Scan, scan_parts, tets_of_page};
 pub use speculation::{DraftState, Evaluated, Speculation, evaluate_speculatively};
-pub use state::{MESH_STATE_WORDS, MeshState, dense, next_id, sparse};
+pub use tetdb_schema::page::{dense, next_id, sparse};
+pub use tetdb_schema::tree::MeshState;
 pub use vertices::{End, VertexTag};

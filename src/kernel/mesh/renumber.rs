@@ -11,9 +11,9 @@ use std::sync::atomic::Ordering::Relaxed;
 use super::anatomy::{Tet, VERTEX_MASK};
 use super::cursor::Mesh;
 use super::scan::{Scan, scan_parts, tets_of_page};
-use super::state::{dense, sparse};
 use super::vertices::VertexTag;
 use super::{FaceRef, MeshState};
+use super::{dense, sparse};
 use tetdb_base::geom::HilbertFrame;
 use tetdb_base::storage::{DiskPath, KeyedId, Pages, Sorter, StorageError, kind};
 use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS};
@@ -53,7 +53,7 @@ pub fn renumber<P: Pages>(
     }
     mesh.clear_scratch();
     let (facets, interface_faces) = (mesh.n_facets(), mesh.n_interface_faces());
-    mesh.set_state(MeshState::dense(n_tets, n_vertices, facets, interface_faces));
+    mesh.set_state(MeshState::without_gaps(n_tets, n_vertices, facets, interface_faces));
     Ok(())
 }
 

@@ -7,8 +7,7 @@ use tetdb_schema::record::{self, CoarseFace, CoarseTet, CoarseVertex};
 
 use super::anatomy::{MARK, REQUIRED, VERTEX_MASK};
 use super::cursor::Mesh;
-use super::state::{dense, sparse};
-use super::{FaceRef, MeshFacet, MeshInterfaceFace, Tet, Workspace};
+use super::{FaceRef, MeshFacet, MeshInterfaceFace, Tet, Workspace, dense, sparse};
 use tetdb_base::geom::orient;
 use tetdb_base::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
 
@@ -64,9 +63,9 @@ impl<P: Pages> Mesh<P> {
     }
 
     /// Facet number `n`.
-    pub fn snapshot_facet(&mut self, n: u32) -> record::Facet {
+    pub fn snapshot_facet(&mut self, n: u32) -> record::WorkingFacet {
         let facet = self.facet(n);
-        record::Facet {
+        record::WorkingFacet {
             vertices: facet.vertices.map(dense),
             label: facet.label,
             triangle: facet.input,
@@ -111,7 +110,7 @@ impl<P: Pages> Mesh<P> {
     }
 
     /// Adds a facet as it was kept.
-    pub fn add_snapshot_facet(&mut self, facet: &record::Facet) {
+    pub fn add_snapshot_facet(&mut self, facet: &record::WorkingFacet) {
         self.add_facet(MeshFacet {
             vertices: facet.vertices.map(sparse),
             label: facet.label,

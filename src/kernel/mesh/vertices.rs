@@ -4,7 +4,7 @@ use tetdb_schema::page::{NONE, Slot, u32_le};
 
 use super::Tet;
 use super::cursor::{Mesh, WORD_ZERO};
-use super::state::{dense, sparse};
+use super::{dense, sparse};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{Pages, kind};
 

@@ -12,9 +12,10 @@ use tetdb_schema::digest::Digest;
 use tetdb_schema::record::SealedTet;
 
 use super::{Finding, Report};
-use crate::sealed::{Corner, RegionTotals, Subdomain, SubdomainTotals};
+use crate::sealed::{Corner, Subdomain, SubdomainTotals};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
+use tetdb_schema::totals::RegionTotals;
 
 /// Recomputed values of one sub-domain.
 pub(super) struct Rederived {

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Packer};
-use tetdb_schema::record::{CoarseFace, CoarseTet, CoarseVertex, Facet};
+use tetdb_schema::record::{CoarseFace, CoarseTet, CoarseVertex, WorkingFacet};
 
 use super::SealedError;
 use super::batch::Batch;
@@ -25,7 +25,7 @@ pub struct CoarseWriter {
     generation: u32,
     vertices: Packer<CoarseVertex>,
     tets: Packer<CoarseTet>,
-    facets: Packer<Facet>,
+    facets: Packer<WorkingFacet>,
     faces: Packer<CoarseFace>,
 }
 
@@ -63,8 +63,8 @@ impl CoarseWriter {
         push(&mut self.file, &mut self.batch, &mut self.tets, tet)
     }
 
-    /// Adds a facet. Errors: the disk.
-    pub fn push_facet(&mut self, facet: Facet) -> Result<(), SealedError> {
+    /// The next facet. Errors: the disk.
+    pub fn push_facet(&mut self, facet: WorkingFacet) -> Result<(), SealedError> {
         push(&mut self.file, &mut self.batch, &mut self.facets, facet)
     }
 
@@ -173,7 +173,7 @@ impl CoarseSnapshot {
     }
 
     /// The facets a chunk at a time.
-    pub fn facets(&mut self) -> Chunks<'_, Facet> {
+    pub fn facets(&mut self) -> Chunks<'_, WorkingFacet> {
         self.chunks(2, self.row.facets)
     }
 

@@ -2,9 +2,9 @@
 //!
 //! Both hold the same records in the same order under the same numbers, and readers return the same.
 
-use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, Packed, Packer};
-use tetdb_schema::leaf::{PageDecoder, PagePacker, PageRecord, PageSet, Working};
+use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, PackedChunk, Packer};
 use tetdb_schema::page::PageError;
+use tetdb_schema::unsealed::{PageDecoder, PagePacker, PageRecord, PageSet, WorkingWords};
 
 use super::SealedError;
 use tetdb_base::storage::{StorageError, StoreFile};
@@ -59,8 +59,8 @@ impl<R> Cut<R> {
     }
 }
 
-impl<R> From<Packed<R>> for Cut<R> {
-    fn from(chunk: Packed<R>) -> Self {
+impl<R> From<PackedChunk<R>> for Cut<R> {
+    fn from(chunk: PackedChunk<R>) -> Self {
         Self {
             first: chunk.first,
             records: chunk.records,
@@ -95,7 +95,7 @@ impl<R: PageRecord> Cutter<R> {
     pub fn push(
         &mut self,
         record: R,
-        working: impl FnOnce(R) -> Working,
+        working: impl FnOnce(R) -> WorkingWords,
     ) -> std::io::Result<Option<Cut<R>>> {
         Ok(match self {
             Self::Chunks(packer) => packer.push(record)?.map(Cut::from),
@@ -192,13 +192,13 @@ fn read_page<R: PageRecord>(
     let damaged = |file: &StoreFile, source: PageError| {
         SealedError::Storage(StorageError::Page { path: file.path().to_owned(), source })
     };
-    let (main, beside) = PageDecoder::keys::<R>(page);
+    let (main, extra) = PageDecoder::keys::<R>(page);
     match file.read(main, |value| frames.open::<R>(page, value))? {
         Some(opened) => opened.map_err(|e| damaged(file, e))?,
         None => return Err(missing(file, address, "page")),
     }
-    if let Some(beside) = beside {
-        match file.read(beside, |value| frames.open_beside::<R>(page, value))? {
+    if let Some(extra) = extra {
+        match file.read(extra, |value| frames.open_extra::<R>(page, value))? {
             Some(opened) => opened.map_err(|e| damaged(file, e))?,
             None => return Err(missing(file, address, "attribute page")),
         }

@@ -29,7 +29,6 @@ pub use form::Form;
 pub use merge_reader::MergeReader;
 pub use shape::{Shape, quality_bin};
 pub use subdomain::{Chunk, Chunks, Subdomain};
-pub use totals::RegionTotals;
 pub use totals::SubdomainTotals;
 pub use vertex_cache::{Corner, VertexCache, input_index};
-pub use writer::{InterfaceSide, Sealed, SealedWriter};
+pub use writer::{Sealed, SealedWriter};

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, RangeSummary, TetSummary, VertexSummary};
 use tetdb_schema::ids::{SubdomainId, TetId};
-use tetdb_schema::leaf::PageRecord;
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
+use tetdb_schema::unsealed::PageRecord;
 
 use super::SealedError;
 use super::form::Loader;

@@ -11,6 +11,7 @@ use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::map_into;
 use tetdb_schema::catalog::QUALITY_BINS;
 use tetdb_schema::catalog::QualityRow;
+use tetdb_schema::totals::RegionTotals;
 
 /// Tetrahedra whose corners are held at once.
 const PIECE: usize = 4096;
@@ -224,13 +225,4 @@ impl SubdomainTotals {
             dihedral: [angle(self.cosines[1]), angle(self.cosines[0])],
         }
     }
-}
-
-/// Sums of a region in this sub-domain.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct RegionTotals {
-    /// Number of tetrahedra.
-    pub tets: u64,
-    /// Volume, summed in the sealed order.
-    pub volume: f64,
 }

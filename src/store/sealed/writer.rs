@@ -7,30 +7,18 @@ use tetdb_schema::chunk::{
 };
 use tetdb_schema::digest::Digest;
 use tetdb_schema::ids::{SubdomainId, TetId};
-use tetdb_schema::leaf::TetPlace;
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
+use tetdb_schema::unsealed::TetLinks;
 
 use super::SealedError;
 use super::batch::Batch;
 use super::form::{Cut, Cutter};
-use super::totals::{RegionTotals, SubdomainTotals, array, count_open};
+use super::totals::{SubdomainTotals, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{DiskPath, StoreFile, join};
 use tetdb_schema::catalog::SubdomainRow;
-
-/// One side of an interface as this sub-domain has it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct InterfaceSide {
-    /// Number of the cut, from 1.
-    pub cut: u32,
-    /// The sub-domain on the other side.
-    pub other: u32,
-    /// Number of faces.
-    pub faces: u64,
-    /// Digest of the faces seen from this side.
-    pub digest: Digest,
-}
+use tetdb_schema::totals::{InterfaceSide, RegionTotals};
 
 /// The result of sealing a sub-domain.
 #[derive(Clone, Debug)]
@@ -185,7 +173,7 @@ impl SealedWriter {
         &mut self,
         tets: impl Iterator<Item = ([u32; 4], u32)> + Send,
     ) -> Result<(), SealedError> {
-        let place = TetPlace { neighbors: [tetdb_schema::page::NONE; 4], required: 0, flags: 0 };
+        let place = TetLinks { neighbors: [tetdb_schema::page::NONE; 4], required: 0, flags: 0 };
         let placed = tets.map(|(nodes, region)| Ok((SealedTet { nodes, region }.rotated(), place)));
         let mut placed = placed.peekable();
         while placed.peek().is_some() {
@@ -201,7 +189,7 @@ impl SealedWriter {
     /// Errors: those of `tets`; the disk; a vertex that was not pushed.
     pub fn push_tets<E: From<SealedError> + Send>(
         &mut self,
-        tets: &mut (impl Iterator<Item = Result<(SealedTet, TetPlace), E>> + Send),
+        tets: &mut (impl Iterator<Item = Result<(SealedTet, TetLinks), E>> + Send),
     ) -> Result<(), E> {
         self.end_vertices()?;
         let (io, rank) = (self.io(), self.subdomain.rank());

@@ -3,15 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use rkyv::api::high::{HighDeserializer, HighValidator};
-use rkyv::bytecheck::CheckBytes;
-use rkyv::rancor;
-use rkyv::{Archive, Deserialize};
+use tetdb_schema::archive::Archivable;
+use tetdb_schema::blob::Blob;
 use tetdb_schema::chunk::is_box;
 use tetdb_schema::digest::Digest;
 use tetdb_schema::page::FORMAT_VERSION;
+use tetdb_schema::row::{self as rows, FORMAT_MAGIC, RowKind, blob_key};
 
-use super::rows::{self, RowKind};
 use super::writer_lock::{LOCK, WriterLock};
 use super::{Step, StoreError};
 use crate::sealed::{CoarseSnapshot, Form, SealedError, Subdomain};
@@ -21,8 +19,6 @@ use tetdb_schema::catalog::{
     SubdomainRow, TopologyRow, WiresRow,
 };
 
-/// First bytes of the format row; the version follows as two bytes.
-const MAGIC: &[u8; 8] = b"TETDBCAT";
 /// The catalog is small: its redb cache need not be large.
 const CACHE_BYTES: usize = 2 << 20;
 const CATALOG: &str = "catalog.redb";
@@ -91,7 +87,7 @@ impl Catalog {
             journal_rows: 0,
         };
         catalog.commit(|step| {
-            let mut format = MAGIC.to_vec();
+            let mut format = FORMAT_MAGIC.to_vec();
             format.extend_from_slice(&FORMAT_VERSION.to_le_bytes());
             step.put_bytes(RowKind::Format.key(0, 0), &format);
             step.set_state(StoreState::New);
@@ -227,7 +223,7 @@ impl Catalog {
                 reason: "its catalog has no format row",
             });
         };
-        let version = format.strip_prefix(MAGIC).and_then(|v| v.try_into().ok());
+        let version = format.strip_prefix(FORMAT_MAGIC).and_then(|v| v.try_into().ok());
         let Some(version) = version.map(u16::from_le_bytes) else {
             return Err(StoreError::NotOurs {
                 path: self.dir().to_owned(),
@@ -256,14 +252,12 @@ impl Catalog {
 
     /// The name of a sub-domain's file in a generation.
     pub fn file_name(subdomain: u32, generation: u32) -> String {
-        let file = FileRow { subdomain, generation };
-        named(SUBDOMAIN, file)
+        FileRow { subdomain, generation }.subdomain_name()
     }
 
     /// The name of a coarse snapshot's file in a generation.
     pub fn coarse_name(subdomain: u32, generation: u32) -> String {
-        let file = FileRow { subdomain, generation };
-        named(COARSE, file)
+        FileRow { subdomain, generation }.coarse_name()
     }
 
     /// Path of the file of a sub-domain in a generation, which may not exist.
@@ -351,16 +345,17 @@ impl Catalog {
     fn purge(&mut self) -> Result<(), StoreError> {
         let is_finished = self.state()?.is_finished();
         let listed = self.files()?;
-        let coarse: Vec<FileRow> = (self.coarse_snapshots()?.iter())
-            .map(|row| FileRow { subdomain: row.rank, generation: row.generation })
-            .collect();
+        let coarse: Vec<FileRow> = (self.coarse_snapshots()?.iter()).map(CoarseRow::file).collect();
         for name in self.dir.list()? {
             let path = self.dir.join(&name);
-            let is_stray = |kind, listed: &[FileRow]| {
-                parsed(kind, &name).is_some_and(|file| !listed.contains(&file))
+            let is_stray = |file: Option<FileRow>, listed: &[FileRow]| {
+                file.is_some_and(|f| !listed.contains(&f))
             };
             let is_draft = [CATALOG_NEW, CATALOG_NEXT].contains(&&*name);
-            if is_draft || is_stray(SUBDOMAIN, &listed) || is_stray(COARSE, &coarse) {
+            if is_draft
+                || is_stray(FileRow::from_subdomain_name(&name), &listed)
+                || is_stray(FileRow::from_coarse_name(&name), &coarse)
+            {
                 path.remove_file()?;
             } else if name == SCRATCH || name == WORK && is_finished {
                 path.remove_dir_all()?;
@@ -397,7 +392,7 @@ impl Catalog {
 
     /// Edges and points that are edges and vertices of the mesh.
     pub fn wires(&mut self) -> Result<WiresRow, StoreError> {
-        let wires = self.row(RowKind::Wires.key(0, 0))?;
+        let wires = self.row(RowKind::Embedded.key(0, 0))?;
         Ok(wires.unwrap_or(WiresRow { fin_first: u64::MAX, ..WiresRow::default() }))
     }
 
@@ -591,11 +586,11 @@ impl Catalog {
         self.rows(RowKind::Journal)
     }
 
-    /// Bytes saved with [`Step::set_blob`], or `None`.
-    pub fn blob(&mut self, number: u32) -> Result<Option<Vec<u8>>, StoreError> {
+    /// Bytes kept with [`Step::set_blob`], or `None`.
+    pub fn blob(&mut self, blob: Blob) -> Result<Option<Vec<u8>>, StoreError> {
         let mut whole = None::<Vec<u8>>;
         for piece in 0.. {
-            let Some(bytes) = self.bytes(RowKind::Blob.key(number, piece))? else {
+            let Some(bytes) = self.bytes(blob_key(blob, piece))? else {
                 break;
             };
             whole.get_or_insert_default().extend_from_slice(&bytes);
@@ -618,12 +613,7 @@ impl Catalog {
     }
 
     /// The only row of a kind. Errors: damage, or there is none.
-    fn needed<T>(&mut self, kind: RowKind) -> Result<T, StoreError>
-    where
-        T: Archive,
-        T::Archived: for<'a> CheckBytes<HighValidator<'a, rancor::Error>>
-            + Deserialize<T, HighDeserializer<rancor::Error>>,
-    {
+    fn needed<T: Archivable>(&mut self, kind: RowKind) -> Result<T, StoreError> {
         let key = kind.key(0, 0);
         self.row(key)?.ok_or_else(|| self.damaged_row(key, "is missing"))
     }
@@ -634,22 +624,12 @@ impl Catalog {
         read.transpose().map_err(|e| self.damaged_row(key, e))
     }
 
-    fn row<T>(&mut self, key: u64) -> Result<Option<T>, StoreError>
-    where
-        T: Archive,
-        T::Archived: for<'a> CheckBytes<HighValidator<'a, rancor::Error>>
-            + Deserialize<T, HighDeserializer<rancor::Error>>,
-    {
+    fn row<T: Archivable>(&mut self, key: u64) -> Result<Option<T>, StoreError> {
         let read = self.file.read(key, |value| rows::decode(key, value))?;
         read.transpose().map_err(|e| self.damaged_row(key, e))
     }
 
-    fn rows<T>(&mut self, kind: RowKind) -> Result<Vec<T>, StoreError>
-    where
-        T: Archive,
-        T::Archived: for<'a> CheckBytes<HighValidator<'a, rancor::Error>>
-            + Deserialize<T, HighDeserializer<rancor::Error>>,
-    {
+    fn rows<T: Archivable>(&mut self, kind: RowKind) -> Result<Vec<T>, StoreError> {
         let mut all = Vec::new();
         let mut wrong = None;
         self.file.scan(kind.keys(), |key, value| {
@@ -693,21 +673,7 @@ fn holds_nothing(names: &[String]) -> bool {
 }
 
 /// First words of the names of files.
-const SUBDOMAIN: &str = "subdomain";
-const COARSE: &str = "coarse";
-
-fn named(kind: &str, file: FileRow) -> String {
-    format!("{kind}-{:05}-g{}.redb", file.subdomain, file.generation)
-}
-
-fn parsed(kind: &str, name: &str) -> Option<FileRow> {
-    let (subdomain, generation) =
-        name.strip_prefix(kind)?.strip_prefix('-')?.strip_suffix(".redb")?.split_once("-g")?;
-    let file = FileRow { subdomain: subdomain.parse().ok()?, generation: generation.parse().ok()? };
-    (named(kind, file) == name).then_some(file)
-}
-
-/// Returns whether numbers of 32 bits can count the records.
+/// Whether records can be counted so: their numbers have 32 bits.
 fn are_counts(counts: [u64; 4]) -> bool {
     counts.iter().all(|&n| n <= u64::from(u32::MAX))
 }

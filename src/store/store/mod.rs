@@ -7,7 +7,6 @@
 
 mod catalog;
 mod error;
-mod rows;
 mod step;
 #[cfg(test)]
 mod tests;

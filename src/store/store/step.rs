@@ -2,14 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::rows::{self, RowKind};
+use tetdb_schema::archive::Archivable;
+use tetdb_schema::blob::Blob;
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
     SubdomainRow, TopologyRow, WiresRow,
 };
-
-/// Length of the pieces a blob is cut into; with 16 bytes of redb and 8 of checksum within 64 KiB.
-const BLOB_PIECE: usize = 65_536 - 24;
+use tetdb_schema::row::{self as rows, BLOB_PIECE, RowKind, blob_key};
 
 /// Rows to set and remove, files to list and forget; applied together by [`crate::store::Catalog::commit`].
 pub struct Step {
@@ -41,16 +40,7 @@ impl Step {
         self.changes.insert(key, Some(rows::guarded_bytes(key, bytes)));
     }
 
-    fn put<T>(&mut self, key: u64, row: &T)
-    where
-        T: for<'a> rkyv::Serialize<
-                rkyv::api::high::HighSerializer<
-                    rkyv::util::AlignedVec,
-                    rkyv::ser::allocator::ArenaHandle<'a>,
-                    rkyv::rancor::Error,
-                >,
-            >,
-    {
+    fn put(&mut self, key: u64, row: &impl Archivable) {
         self.changes.insert(key, Some(rows::encode(key, row)));
     }
 
@@ -81,7 +71,7 @@ impl Step {
 
     /// Sets the embedded edges and points.
     pub fn set_wires(&mut self, wires: &WiresRow) {
-        self.put(RowKind::Wires.key(0, 0), wires);
+        self.put(RowKind::Embedded.key(0, 0), wires);
     }
 
     /// Sets the row of a sub-domain.
@@ -142,26 +132,26 @@ impl Step {
         self.journal_rows += 1;
     }
 
-    /// Saves bytes under a number below 2^24, such as the size field.
+    /// Keeps the bytes of a blob.
     ///
     /// Replaces a blob of any length: the piece after its last is removed, and reading stops there.
-    pub fn set_blob(&mut self, number: u32, bytes: &[u8]) {
+    pub fn set_blob(&mut self, blob: Blob, bytes: &[u8]) {
         let mut pieces = 0;
         for piece in bytes.chunks(BLOB_PIECE) {
-            self.put_bytes(RowKind::Blob.key(number, pieces), piece);
+            self.put_bytes(blob_key(blob, pieces), piece);
             pieces += 1;
         }
         if pieces == 0 {
-            self.put_bytes(RowKind::Blob.key(number, 0), &[]);
+            self.put_bytes(blob_key(blob, 0), &[]);
             pieces = 1;
         }
-        self.changes.insert(RowKind::Blob.key(number, pieces), None);
+        self.changes.insert(blob_key(blob, pieces), None);
     }
 
-    /// Removes a blob of so many bytes.
-    pub fn remove_blob(&mut self, number: u32, bytes: usize) {
+    /// Forgets a blob of so many bytes.
+    pub fn remove_blob(&mut self, blob: Blob, bytes: usize) {
         for piece in 0..=bytes.div_ceil(BLOB_PIECE) as u32 {
-            self.changes.insert(RowKind::Blob.key(number, piece), None);
+            self.changes.insert(blob_key(blob, piece), None);
         }
     }
 }

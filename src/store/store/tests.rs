@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::sealed::Shape;
+use tetdb_schema::blob::Blob;
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
@@ -56,7 +57,7 @@ fn a_step_flips_rows_and_forgets_files_together() -> Outcome {
     std::fs::write(old.path(), b"old")?;
     catalog.commit(|step| {
         step.list_file(3, 1);
-        step.set_blob(1, &vec![7; 200_000]);
+        step.set_blob(Blob::SizeField, &vec![7; 200_000]);
         Ok(())
     })?;
     std::fs::write(new.path(), b"new")?;
@@ -72,7 +73,7 @@ fn a_step_flips_rows_and_forgets_files_together() -> Outcome {
         step.unlist_file(3, 1);
         step.append_journal(&journal);
         step.append_journal(&journal);
-        step.set_blob(1, &[7; 100_000]);
+        step.set_blob(Blob::SizeField, &[7; 100_000]);
         Ok(())
     })?;
     assert!(!old.exists() && new.exists());
@@ -91,8 +92,8 @@ fn a_step_flips_rows_and_forgets_files_together() -> Outcome {
     assert!(!torn.exists() && new.exists() && path.join("notes.txt").exists());
     assert_eq!(catalog.files()?, [FileRow { subdomain: 3, generation: 2 }]);
     assert_eq!(catalog.journal()?, [journal.clone(), journal]);
-    assert_eq!(catalog.blob(1)?, Some(vec![7; 100_000]));
-    assert_eq!(catalog.blob(2)?, None);
+    assert_eq!(catalog.blob(Blob::SizeField)?, Some(vec![7; 100_000]));
+    assert_eq!(catalog.blob(Blob::Recipe)?, None);
     assert!(
         no_error(catalog.commit(|step| {
             step.list_file(9, 9);

@@ -14,15 +14,15 @@ use tetdb_schema::chunk::{
     ChunkAddress, ChunkKind, ChunkRecord, Decoder, HEAD_BYTES, RangeSummary, TetSummary,
     VertexSummary,
 };
-use tetdb_schema::leaf::{PageDecoder, PageRecord, beside_page};
 use tetdb_schema::page::{
     FORMAT_VERSION, Frame, PageAddress, PageKind, SLOTS, STORED_BYTES, access_page, open_page,
     seal_full_page, seal_page,
 };
 use tetdb_schema::record::{
-    CoarseFace, CoarseTet, CoarseVertex, Facet, InterfaceFace, SealedFacet, SealedTet,
-    SealedVertex, Tet, TetAttribute, Vertex,
+    CoarseFace, CoarseTet, CoarseVertex, InterfaceFace, SealedFacet, SealedTet, SealedVertex,
+    TetAttribute, WorkingFacet, WorkingTet, WorkingVertex,
 };
+use tetdb_schema::unsealed::{PageDecoder, PageRecord, extra_page};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// A target and the folder of its corpus.
@@ -56,7 +56,7 @@ pub const TARGETS: &[Target] = &[
     text("config", config),
     text("option", option),
     Target { name: "page", format: None, run: page },
-    Target { name: "leaf", format: None, run: leaf },
+    Target { name: "unsealed", format: None, run: unsealed },
     Target { name: "chunk", format: None, run: chunk },
     Target { name: "file", format: None, run: crate::file::changed },
     Target { name: "store", format: None, run: crate::store::changed },
@@ -154,26 +154,26 @@ fn page(bytes: &[u8]) {
     let elsewhere = PageAddress { page: 8, ..address };
     assert!(open_page(&stored, elsewhere, &mut frame[..]).is_err());
     for slot in frame.iter().take(64) {
-        assert_eq!(Tet::from_slot(slot).to_slot(), *slot);
-        assert_eq!(Facet::from_slot(slot).to_slot(), *slot);
-        let _ = (Vertex::from_slot(slot), TetAttribute::from_slot(slot, 3));
+        assert_eq!(WorkingTet::from_slot(slot).to_slot(), *slot);
+        assert_eq!(WorkingFacet::from_slot(slot).to_slot(), *slot);
+        let _ = (WorkingVertex::from_slot(slot), TetAttribute::from_slot(slot, 3));
     }
 }
 
 /// Two bytes of count, then the slots of a page and of the one beside it.
-fn leaf(bytes: &[u8]) {
+fn unsealed(bytes: &[u8]) {
     let Some((&kind, rest)) = bytes.split_first() else {
         return;
     };
     match kind % 4 {
-        0 => leaf_records::<SealedTet>(rest),
-        1 => leaf_records::<SealedVertex>(rest),
-        2 => leaf_records::<SealedFacet>(rest),
-        _ => leaf_records::<InterfaceFace>(rest),
+        0 => unsealed_records::<SealedTet>(rest),
+        1 => unsealed_records::<SealedVertex>(rest),
+        2 => unsealed_records::<SealedFacet>(rest),
+        _ => unsealed_records::<InterfaceFace>(rest),
     }
 }
 
-fn leaf_records<R: PageRecord>(bytes: &[u8]) {
+fn unsealed_records<R: PageRecord>(bytes: &[u8]) {
     /// So that the page beside it is not its first.
     const PAGE: u32 = 9;
     let mut decoder = PageDecoder::new(5, 2);
@@ -181,7 +181,7 @@ fn leaf_records<R: PageRecord>(bytes: &[u8]) {
     let count = bytes.iter().take(2).fold(0, |n, &b| n << 8 | u32::from(b)) % 2100;
     let mut content = bytes.get(2..).unwrap_or_default().to_vec();
     content.resize(2 * STORED_BYTES, 0);
-    let (main, beside) = content.split_at(STORED_BYTES);
+    let (main, extra) = content.split_at(STORED_BYTES);
     let sealed = |kind: PageKind, page: u32, content: &[u8]| {
         let mut frame: Box<Frame> = Box::new([Default::default(); SLOTS]);
         bytemuck::cast_slice_mut(&mut frame[..SLOTS - 1]).copy_from_slice(content);
@@ -191,9 +191,9 @@ fn leaf_records<R: PageRecord>(bytes: &[u8]) {
     };
     let opened = decoder.open::<R>(PAGE, &sealed(R::PAGE, PAGE, main));
     assert_eq!(opened, Ok(()));
-    if let Some(kind) = R::BESIDE {
-        let value = sealed(kind, beside_page(PAGE), beside);
-        assert_eq!(decoder.open_beside::<R>(PAGE, &value), Ok(()));
+    if let Some(kind) = R::EXTRA {
+        let value = sealed(kind, extra_page(PAGE), extra);
+        assert_eq!(decoder.open_extra::<R>(PAGE, &value), Ok(()));
     }
     let mut records: Vec<R> = Vec::new();
     let first = decoder.records(PAGE, &mut records);
@@ -216,7 +216,7 @@ fn chunk(bytes: &[u8]) {
         7 => records::<RangeSummary<false>>(rest),
         8 => records::<CoarseTet>(rest),
         9 => records::<CoarseVertex>(rest),
-        10 => records::<Facet>(rest),
+        10 => records::<WorkingFacet>(rest),
         _ => records::<CoarseFace>(rest),
     }
 }

@@ -2,41 +2,48 @@
 
 use std::collections::BTreeMap;
 
-use super::owners::{NewCut, TopologyChange, read_owners};
+use super::owners::{NewCut, TopologyChange};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::seal::totals::{Totals, sum_totals};
-use crate::pipeline::tree::{self, PartMesh, blob};
+use crate::pipeline::tree::{self, read_blob};
 use crate::pipeline::work::stages;
-use crate::pipeline::work::{CutOrder, CutReceipt, SubdomainOrder, SubdomainReceipt};
+use tetdb_schema::blob::Blob;
 use tetdb_schema::catalog::StoreState;
+use tetdb_schema::topology::FaceOwners;
+use tetdb_schema::tree::SubtreeMesh;
+use tetdb_schema::work::{CutOrder, CutReceipt, SubdomainOrder, SubdomainReceipt};
 use tetdb_store::store::{Catalog, StoreError};
 
-/// What bisects a part of a mesh of `n` sub-domains. Errors: a damaged catalog.
-pub fn cut_order(catalog: &mut Catalog, n: u32, parent: PartMesh) -> Result<CutOrder, StoreError> {
-    let zones = tree::zones_above(catalog, parent.part, n)?;
+/// The order that bisects a subtree in a mesh of `n` sub-domains. Errors: a damaged catalog.
+pub fn cut_order(
+    catalog: &mut Catalog,
+    n: u32,
+    parent: SubtreeMesh,
+) -> Result<CutOrder, StoreError> {
+    let zones = tree::zones_above(catalog, parent.ranks, n)?;
     Ok(CutOrder { parent, zones })
 }
 
-/// What makes a sub-domain, once all cuts are made. Errors: a damaged catalog.
+/// The order that meshes a sub-domain, once there are all cuts. Errors: a damaged catalog.
 pub fn subdomain_order(
     catalog: &mut Catalog,
     n: u32,
-    part: PartMesh,
+    mesh: SubtreeMesh,
 ) -> Result<SubdomainOrder, StoreError> {
     let mut owners = BTreeMap::new();
-    for cut in part.part.cuts_above(n) {
-        let table = read_owners(catalog, cut)?;
-        owners.insert(cut, table.across(part.part.first));
+    for cut in mesh.ranks.cuts_above(n) {
+        let table: FaceOwners = read_blob(catalog, Blob::FaceOwners(cut))?;
+        owners.insert(cut, table.across(mesh.ranks.first));
     }
-    let zones = tree::zones_above(catalog, part.part, n)?;
-    Ok(SubdomainOrder { part, zones, owners })
+    let zones = tree::zones_above(catalog, mesh.ranks, n)?;
+    Ok(SubdomainOrder { mesh, zones, owners })
 }
 
 /// Commits bisections, each after those above it, in one step: of the files between them only the last children's are there.
 pub fn commit_cuts(catalog: &mut Catalog, cuts: &[CutReceipt]) -> Result<(), PipelineError> {
     let mut topology = TopologyChange::none(catalog)?;
     for cut in cuts {
-        let [low, high] = cut.children.map(|child| child.part.first);
+        let [low, high] = cut.children.map(|child| child.ranks.first);
         let new =
             NewCut { cut: cut.zone.cut, faces: cut.faces, low, high, inherited: &cut.inherited };
         topology.add(catalog, &new)?;
@@ -44,12 +51,12 @@ pub fn commit_cuts(catalog: &mut Catalog, cuts: &[CutReceipt]) -> Result<(), Pip
     catalog.commit(|step| {
         for cut in cuts {
             for child in cut.children {
-                step.list_file(child.part.first, child.generation);
-                step.set_blob(blob::PART + child.part.first, &child.to_bytes());
+                step.list_file(child.ranks.first, child.generation);
+                step.set_blob(Blob::Subtree(child.ranks.first), &child.to_bytes());
             }
-            step.unlist_file(cut.parent.part.first, cut.parent.generation);
+            step.unlist_file(cut.parent.ranks.first, cut.parent.generation);
             stages::list(&cut.stages, &cut.stage_faces, step);
-            step.set_blob(blob::CUT + cut.zone.cut, &tree::plane_bytes(cut.zone));
+            step.set_blob(Blob::CutPlane(cut.zone.cut), &cut.zone.to_bytes());
             step.append_journal(&cut.journal);
         }
         topology.commit(step);
@@ -62,18 +69,18 @@ pub fn commit_cuts(catalog: &mut Catalog, cuts: &[CutReceipt]) -> Result<(), Pip
 /// Commits a finished sub-domain.
 pub fn commit_subdomain(
     catalog: &mut Catalog,
-    leaf: &SubdomainReceipt,
+    receipt: &SubdomainReceipt,
 ) -> Result<(), PipelineError> {
-    let mut journal = leaf.journal.clone();
+    let mut journal = receipt.journal.clone();
     // A finished sub-domain leaves the state of the whole as it is until the last one.
     journal.state = catalog.state()?;
     catalog.commit(|step| {
-        let rank = leaf.row.rank;
-        step.set_subdomain(&leaf.row);
-        step.set_blob(blob::SEALED + rank, &leaf.totals);
-        step.list_file(rank, leaf.row.generation);
-        step.unlist_file(rank, leaf.coarse);
-        if let Some(kept) = &leaf.kept {
+        let rank = receipt.row.rank;
+        step.set_subdomain(&receipt.row);
+        step.set_blob(Blob::Totals(rank), &receipt.totals);
+        step.list_file(rank, receipt.row.generation);
+        step.unlist_file(rank, receipt.coarse);
+        if let Some(kept) = &receipt.kept {
             step.list_coarse(kept);
         }
         step.append_journal(&journal);

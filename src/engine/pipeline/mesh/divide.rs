@@ -7,9 +7,10 @@ use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::tasks::{ask, wrong_receipt};
 use crate::pipeline::tree;
-use crate::pipeline::work::{CutOrder, CutReceipt, Order, Receipt, Worker, Workplace};
+use crate::pipeline::work::{Worker, Workplace};
 use crate::pipeline::workers::{Hand, work_off};
 use tetdb_kernel::bisect::CutReport;
+use tetdb_schema::work::{CutOrder, CutReceipt, Receipt, WorkOrder};
 
 /// What a cut was, and how it went where this process made it.
 type CutDone = (CutOrder, CutReceipt, Option<CutReport>);
@@ -17,8 +18,8 @@ type CutDone = (CutOrder, CutReceipt, Option<CutReport>);
 impl Run<'_> {
     /// Bisects until no part has more than one sub-domain, as many parts at once as there are threads and memory for.
     pub fn divide_all(&mut self) -> Result<Vec<CutReport>, PipelineError> {
-        let mut parts = tree::parts(self.catalog, self.n)?;
-        parts.retain(|p| p.part.count > 1);
+        let mut parts = tree::subtrees(self.catalog, self.n)?;
+        parts.retain(|p| p.ranks.count > 1);
         if parts.is_empty() {
             return Ok(Vec::new());
         }
@@ -44,7 +45,7 @@ impl Run<'_> {
                 move |(order, _): (CutOrder, Plan), _: &Watcher| match ask(
                     &**helpers,
                     *slot,
-                    &Order::Cut(order.clone()),
+                    &WorkOrder::Cut(order.clone()),
                     store,
                 )? {
                     Receipt::Cut(receipt) => Ok((order, receipt, None)),

@@ -1,12 +1,14 @@
-//! Who owns the faces of a cut and who neighbors whom, as the catalog keeps it.
+//! Owners of the faces of cuts, and neighbors of subtrees, as the catalog keeps them.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::pipeline::tree::blob;
-use crate::pipeline::work::InheritedFace;
-use tetdb_kernel::topology::{NeighborCounts, Owners};
+use crate::pipeline::tree::read_blob;
+use tetdb_kernel::topology::NeighborCounts;
+use tetdb_schema::blob::{Blob, BlobContent};
 use tetdb_schema::catalog::{NeighborRow, TopologyRow};
+use tetdb_schema::topology::FaceOwners;
+use tetdb_schema::work::InheritedFace;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::{Catalog, Step, StoreError};
 
@@ -22,10 +24,10 @@ pub struct NewCut<'a> {
     pub inherited: &'a [InheritedFace],
 }
 
-/// What cuts change in the catalog's tables of owners and neighbors.
+/// Changes of the catalog's tables of owners and neighbors by cuts.
 pub struct TopologyChange {
     /// By cut.
-    owners: BTreeMap<u32, Owners>,
+    owners: BTreeMap<u32, FaceOwners>,
     neighbors: NeighborCounts,
     /// Parts whose rows change.
     names: BTreeSet<u32>,
@@ -45,12 +47,14 @@ impl TopologyChange {
     pub fn add(&mut self, catalog: &mut Catalog, new: &NewCut) -> Result<(), StoreError> {
         let &NewCut { cut, faces, low, high, .. } = new;
         let (owners, neighbors) = (&mut self.owners, &mut self.neighbors);
-        owners.insert(cut, Owners::new(faces, low, high));
+        owners.insert(cut, FaceOwners::new(faces, low, high));
         neighbors.set(low, high, u64::from(faces));
         for face in new.inherited {
             let table = match owners.entry(face.cut) {
                 Entry::Occupied(entry) => entry.into_mut(),
-                Entry::Vacant(entry) => entry.insert(read_owners(catalog, face.cut)?),
+                Entry::Vacant(entry) => {
+                    entry.insert(read_blob(catalog, Blob::FaceOwners(face.cut))?)
+                }
             };
             let other = table.other(face.index, face.side).ok_or_else(|| {
                 StoreError::Sealed(SealedError::Content {
@@ -72,24 +76,12 @@ impl TopologyChange {
     /// Puts it into `step`.
     pub fn commit(&self, step: &mut Step) {
         for (cut, table) in &self.owners {
-            step.set_blob(blob::OWNERS + cut, &table.to_bytes());
+            step.set_blob(Blob::FaceOwners(*cut), &table.to_bytes());
         }
         for &name in &self.names {
             step.set_topology(&topology_row(&self.neighbors, name));
         }
     }
-}
-
-/// The owners of a cut's faces.
-pub fn read_owners(catalog: &mut Catalog, cut: u32) -> Result<Owners, StoreError> {
-    let bytes = catalog.blob(blob::OWNERS + cut)?.unwrap_or_default();
-    Owners::from_bytes(&bytes).ok_or_else(|| {
-        StoreError::Sealed(SealedError::Content {
-            path: catalog.dir().to_owned(),
-            subdomain: cut,
-            what: format!("the table of owners of cut {cut} is damaged"),
-        })
-    })
 }
 
 fn neighbors_of(rows: &[TopologyRow]) -> NeighborCounts {

@@ -15,12 +15,10 @@ use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::journal;
 use crate::pipeline::tasks::{ask, begin, wrong_receipt};
-use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob};
+use crate::pipeline::tree::{self, DONE};
 use crate::pipeline::work::common::Common;
-use crate::pipeline::work::{
-    FineReport, Helpers, Order, Receipt, SubdomainOrder, SubdomainReceipt, Traffic, Worker,
-    Workplace,
-};
+use crate::pipeline::work::traffic::pages_of;
+use crate::pipeline::work::{FineReport, Helpers, Worker, Workplace};
 use crate::pipeline::workers::{Hand, map_bounded};
 use tetdb_base::geom::{Aabb, HilbertFrame};
 use tetdb_base::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
@@ -29,7 +27,10 @@ use tetdb_kernel::bisect::{CutReport, load_of};
 use tetdb_kernel::boundary::RegionSummary;
 use tetdb_kernel::mesh::{Mesh, Workspace, renumber};
 use tetdb_kernel::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
+use tetdb_schema::blob::{Blob, BlobContent};
 use tetdb_schema::catalog::{RegionRow, StoreState, WiresRow};
+use tetdb_schema::tree::{RankRange, SubtreeMesh};
+use tetdb_schema::work::{Receipt, SubdomainOrder, SubdomainReceipt, Traffic, WorkOrder};
 use tetdb_store::store::{Catalog, INPUT_TRIANGLES};
 
 /// Generation of the coarse mesh.
@@ -69,7 +70,7 @@ pub fn mesh(
 ) -> Result<Summary, PipelineError> {
     let scratch = catalog.scratch_dir()?;
     let left = budget.cap().saturating_sub(surface.bytes() as u64);
-    match catalog.blob(blob::SIZE_FIELD)? {
+    match catalog.blob(Blob::SizeField)? {
         None => {
             let (prepared, begun) = ahead(surface, options, budget.cap(), watch, |taken| {
                 let room = ScratchSpace::new(left.saturating_sub(taken), scratch);
@@ -191,8 +192,8 @@ impl<'a> Run<'a> {
         let cuts = self.divide_all()?;
         let mut summary = self.summary(coarse, sizes, cuts)?;
         let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
-        let mut left = tree::parts(self.catalog, self.n)?;
-        left.retain(|p| !sealed.contains(&p.part.first));
+        let mut left = tree::subtrees(self.catalog, self.n)?;
+        left.retain(|p| !sealed.contains(&p.ranks.first));
         self.leaves(left, open, &mut summary)?;
         close(self.catalog, self.n)?;
         (summary.pages, summary.frames_used) = (self.pages, self.frames_used);
@@ -263,8 +264,8 @@ impl<'a> Run<'a> {
         let (n, _) = n_subdomains(predicted, self.options);
         let path = self.catalog.file_path(0, COARSE);
         mesh.pages_mut().end_generation(path, COARSE + DONE);
-        let part = PartMesh {
-            part: TreePart { first: 0, count: n },
+        let part = SubtreeMesh {
+            ranks: RankRange::root(n),
             generation: COARSE,
             state: mesh.state(),
             extents: mesh.pages().extents(),
@@ -283,10 +284,10 @@ impl<'a> Run<'a> {
             if let Some(wires) = &wires {
                 step.set_wires(wires);
             }
-            step.set_blob(blob::SIZE_FIELD, &field);
-            step.set_blob(blob::BOUNDS, &tree::bounds_bytes(&bounds));
-            step.set_blob(blob::SUBDOMAINS, &n.to_le_bytes());
-            step.set_blob(blob::PART, &part.to_bytes());
+            step.set_blob(Blob::SizeField, &field);
+            step.set_blob(Blob::Bounds, &tree::corners(&bounds).to_bytes());
+            step.set_blob(Blob::SubdomainCount, &n.to_le_bytes());
+            step.set_blob(Blob::Subtree(0), &part.to_bytes());
             step.set_state(StoreState::Coarse);
             step.append_journal(&journal(
                 StoreState::Coarse,
@@ -320,7 +321,7 @@ impl<'a> Run<'a> {
     /// Makes the sub-domains that are left, as many at once as there are threads and memory for.
     fn leaves(
         &mut self,
-        left: Vec<PartMesh>,
+        left: Vec<SubtreeMesh>,
         open: Option<Mesh>,
         summary: &mut Summary,
     ) -> Result<(), PipelineError> {
@@ -348,7 +349,7 @@ impl<'a> Run<'a> {
                 move |order: SubdomainOrder, _: &Watcher| match ask(
                     &**helpers,
                     *slot,
-                    &Order::Subdomain(order),
+                    &WorkOrder::Subdomain(order),
                     store,
                 )? {
                     Receipt::Subdomain(receipt) => Ok((Box::new(receipt), None)),
@@ -396,7 +397,7 @@ impl<'a> Run<'a> {
 
     /// Adds to what the run has read and written.
     pub fn count(&mut self, traffic: Traffic) {
-        self.pages.add(traffic.pages());
+        self.pages.add(pages_of(traffic));
         self.frames_used = self.frames_used.max(traffic.frames_used as usize);
     }
 }

@@ -5,9 +5,10 @@ use std::time::Instant;
 
 use super::summary::{Remade, ResaturateSummary};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::seal::totals::{journal, sum_totals, totals_of};
-use crate::pipeline::tree::{self, blob};
+use crate::pipeline::seal::totals::{journal, sum_totals};
+use crate::pipeline::tree::{self, read_blob};
 use tetdb_base::storage::PagerStats;
+use tetdb_schema::blob::Blob;
 use tetdb_schema::catalog::{StoreState, SubdomainRow};
 use tetdb_store::store::{Catalog, Step, StoreError};
 
@@ -24,20 +25,18 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
     let (mut parts, mut totals, mut blobs) = (Vec::new(), BTreeMap::new(), Vec::new());
     for row in before {
         let rank = row.rank;
-        totals.insert(rank, totals_of(catalog, blob::SEALED_BEFORE, rank)?);
-        for (now, then) in VERSIONED {
-            let old = catalog.blob(then + rank)?;
-            let new = catalog.blob(now + rank)?;
-            blobs.push(([now + rank, then + rank], old, new));
+        totals.insert(rank, read_blob(catalog, Blob::PreviousTotals(rank))?);
+        for [now, previous] in Blob::versioned(rank) {
+            blobs.push(([now, previous], catalog.blob(previous)?, catalog.blob(now)?));
         }
         parts.push(Remade { before: catalog.subdomain(rank)?, after: row, fine: None });
     }
     let regions = sum_totals(catalog, n, &totals)?.regions;
     catalog.commit(|step| {
-        for ([now, then], old, new) in &blobs {
-            let length = |blob: &Option<Vec<u8>>| blob.as_ref().map_or(0, Vec::len);
+        for ([now, previous], old, new) in &blobs {
+            let length = |bytes: &Option<Vec<u8>>| bytes.as_ref().map_or(0, Vec::len);
             step.remove_blob(*now, length(new));
-            step.remove_blob(*then, length(old));
+            step.remove_blob(*previous, length(old));
             if let Some(bytes) = old {
                 step.set_blob(*now, bytes);
             }
@@ -68,17 +67,10 @@ pub fn forget(catalog: &mut Catalog) -> Result<usize, PipelineError> {
     Ok(n)
 }
 
-/// Blobs of which there is a previous version: where they are, where those are.
-pub const VERSIONED: [(u32, u32); 3] = [
-    (blob::SEALED, blob::SEALED_BEFORE),
-    (blob::FIELD, blob::FIELD_BEFORE),
-    (blob::ASKED, blob::ASKED_BEFORE),
-];
-
 /// The previous version, and the lengths of its blobs.
 pub struct Previous {
     pub rows: Vec<SubdomainRow>,
-    blobs: Vec<(u32, usize)>,
+    blobs: Vec<(Blob, usize)>,
 }
 
 impl Previous {
@@ -87,9 +79,9 @@ impl Previous {
         let rows = catalog.previous()?;
         let mut blobs = Vec::new();
         for row in &rows {
-            for (_, then) in VERSIONED {
-                if let Some(bytes) = catalog.blob(then + row.rank)? {
-                    blobs.push((then + row.rank, bytes.len()));
+            for [_, previous] in Blob::versioned(row.rank) {
+                if let Some(bytes) = catalog.blob(previous)? {
+                    blobs.push((previous, bytes.len()));
                 }
             }
         }
@@ -102,8 +94,8 @@ impl Previous {
             step.remove_previous(row.rank);
             step.unlist_file(row.rank, row.generation);
         }
-        for &(number, length) in &self.blobs {
-            step.remove_blob(number, length);
+        for &(blob, length) in &self.blobs {
+            step.remove_blob(blob, length);
         }
     }
 }

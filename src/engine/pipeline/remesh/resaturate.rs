@@ -12,8 +12,8 @@ use super::summary::ResaturateSummary;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::tree::blob;
 use tetdb_base::storage::{Budget, attempt};
+use tetdb_schema::blob::Blob;
 use tetdb_store::store::{Catalog, StoreError};
 
 /// What would be meshed again.
@@ -96,6 +96,6 @@ pub fn changed(
 ///
 /// Errors: a damaged catalog.
 pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreError> {
-    let bytes = catalog.blob(blob::ASKED + rank)?;
+    let bytes = catalog.blob(Blob::Request(rank))?;
     Ok(bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
 }

@@ -4,16 +4,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::previous::{Previous, VERSIONED};
+use super::previous::Previous;
 use super::request::Resaturation;
 use super::sizes::{Recorded, Values};
 use super::summary::{Remade, ResaturateSummary};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::owners::read_owners;
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::totals::{SealedTotals, journal, sum_totals};
-use crate::pipeline::tree::{self, PartMesh, blob};
+use crate::pipeline::seal::totals::{journal, sum_totals, totals_of};
+use crate::pipeline::tree::{self, read_blob};
 use crate::pipeline::work::coarse_snapshot::reopen;
 use crate::pipeline::work::common::Common;
 use crate::pipeline::work::soundness::{check_owners, panic_is_damage_of};
@@ -23,7 +22,10 @@ use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Backing, Budget, DiskPath, PagerStats, ScratchSpace, attempt};
 use tetdb_kernel::mesh::Workspace;
 use tetdb_kernel::sizing::{BackgroundMesh, SizeField};
+use tetdb_schema::blob::{Blob, BlobContent};
 use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow};
+use tetdb_schema::topology::FaceOwners;
+use tetdb_schema::tree::SubtreeMesh;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::sealed::{CoarseSnapshot, Form};
 use tetdb_store::store::{Catalog, StoreError};
@@ -47,13 +49,13 @@ pub struct RemeshRun<'a> {
 }
 
 /// A sub-domain to be made again.
-struct Job {
+struct RemeshJob {
     subdomain: SubdomainJob,
     kept: CoarseRow,
     path: DiskPath,
 }
 
-impl Job {
+impl RemeshJob {
     fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
         let Self { subdomain, kept, path } = self;
         let (share, generation) = (subdomain.share, subdomain.generation);
@@ -209,17 +211,17 @@ impl<'a> RemeshRun<'a> {
         let bounds = tree::bounds(self.catalog)?;
         let workers = plan.workers().min(self.rows.len()).max(1);
         let share = plan.shared_by(workers as u64).without_file();
-        let parts = tree::parts(self.catalog, self.n)?;
+        let meshes = tree::subtrees(self.catalog, self.n)?;
         let whole = Arc::clone(&self.field);
         let common = Common::new(self.options, &whole, bounds);
         let mut state = (self, BTreeMap::new());
-        let run = &|job: Job, watch: &Watcher| job.run(common, watch).map(Box::new);
+        let run = &|job: RemeshJob, watch: &Watcher| job.run(common, watch).map(Box::new);
         map_bounded(
             &mut state,
             fields.into_iter().collect(),
-            &vec![run as Hand<Job, Box<FinishedSubdomain>>; workers],
+            &vec![run as Hand<RemeshJob, Box<FinishedSubdomain>>; workers],
             watch,
-            |(again, _), (rank, field)| again.job(parts[rank as usize], field, share),
+            |(again, _), (rank, field)| again.job(meshes[rank as usize], field, share),
             |(_, finished), subdomain| {
                 finished.insert(subdomain.sealed.row.rank, *subdomain);
                 Ok(())
@@ -231,19 +233,20 @@ impl<'a> RemeshRun<'a> {
 
     fn job(
         &mut self,
-        part: PartMesh,
+        mesh: SubtreeMesh,
         field: Option<SizeField>,
         share: Plan,
-    ) -> Result<Job, PipelineError> {
-        let rank = part.part.first;
+    ) -> Result<RemeshJob, PipelineError> {
+        let rank = mesh.ranks.first;
         let mut owners = BTreeMap::new();
-        for cut in part.part.cuts_above(self.n) {
-            owners.insert(cut, read_owners(self.catalog, cut)?.across(rank));
+        for cut in mesh.ranks.cuts_above(self.n) {
+            let table: FaceOwners = read_blob(self.catalog, Blob::FaceOwners(cut))?;
+            owners.insert(cut, table.across(rank));
         }
         // The faces of cuts stay; with sizes of its own a sub-domain may be refined up to them.
         let zones = match field {
             Some(_) => Vec::new(),
-            None => tree::zones_above(self.catalog, part.part, self.n)?,
+            None => tree::zones_above(self.catalog, mesh.ranks, self.n)?,
         };
         let asked = self.rows.iter().find(|(row, _)| row.rank == rank);
         let (row, kept) = asked.expect("asked for");
@@ -253,7 +256,7 @@ impl<'a> RemeshRun<'a> {
         let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
         scratch.create_dir_all()?;
         let subdomain = SubdomainJob {
-            part,
+            mesh,
             base: self.catalog.coarse_path(rank, kept.generation),
             sealed: self.catalog.file_path(rank, generation),
             generation,
@@ -266,7 +269,7 @@ impl<'a> RemeshRun<'a> {
             owners,
             share,
         };
-        Ok(Job { subdomain, kept, path: self.catalog.coarse_path(rank, kept.generation) })
+        Ok(RemeshJob { subdomain, kept, path: self.catalog.coarse_path(rank, kept.generation) })
     }
 
     fn commit(
@@ -290,10 +293,11 @@ impl<'a> RemeshRun<'a> {
             }
             is_new |= sealed.row.digest != row.digest;
             let own = made.get(&rank);
-            is_new |= own.is_some() && own != self.catalog.blob(blob::FIELD + rank)?.as_ref();
-            totals.insert(rank, SealedTotals::of(sealed));
-            for (now, then) in VERSIONED {
-                old_blobs.push((then + rank, self.catalog.blob(now + rank)?));
+            is_new |=
+                own.is_some() && own != self.catalog.blob(Blob::SubdomainField(rank))?.as_ref();
+            totals.insert(rank, totals_of(sealed));
+            for [now, previous] in Blob::versioned(rank) {
+                old_blobs.push((previous, self.catalog.blob(now)?));
             }
         }
         if !is_new {
@@ -310,9 +314,9 @@ impl<'a> RemeshRun<'a> {
         self.catalog.commit(|step| {
             if !what.repair {
                 dropped.drop(step);
-                for (number, bytes) in &old_blobs {
+                for (previous, bytes) in &old_blobs {
                     if let Some(bytes) = bytes {
-                        step.set_blob(*number, bytes);
+                        step.set_blob(*previous, bytes);
                     }
                 }
             }
@@ -320,14 +324,14 @@ impl<'a> RemeshRun<'a> {
                 let (rank, subdomain) = (row.rank, &finished[&row.rank]);
                 step.list_file(rank, subdomain.sealed.row.generation);
                 step.set_subdomain(&subdomain.sealed.row);
-                step.set_blob(blob::SEALED + rank, &totals[&rank].to_bytes());
+                step.set_blob(Blob::Totals(rank), &totals[&rank].to_bytes());
                 match what.repair {
                     true => step.unlist_file(rank, row.generation),
                     false => step.set_previous(row),
                 }
                 if let (Some(field), Some(asked)) = (made.get(&rank), asked) {
-                    step.set_blob(blob::FIELD + rank, field);
-                    step.set_blob(blob::ASKED + rank, asked);
+                    step.set_blob(Blob::SubdomainField(rank), field);
+                    step.set_blob(Blob::Request(rank), asked);
                 }
                 let refine = &subdomain.fine.refine;
                 let measures = [
@@ -401,7 +405,7 @@ pub fn recorded_field(
     options: &Options,
     room: &ScratchSpace,
 ) -> Result<SizeField, PipelineError> {
-    let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+    let bytes = catalog.blob(Blob::SizeField)?.unwrap_or_default();
     let diagonal = tree::bounds(catalog)?.diagonal();
     let field = SizeField::from_bytes_in(&bytes, room)?;
     Ok(field.with_sources(&options.mesh.sizes, diagonal)?)

@@ -1,7 +1,7 @@
 //! Sizes for sub-domains that are made again.
 
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::tree::blob;
+use tetdb_schema::blob::Blob;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::{Catalog, StoreError};
 
@@ -99,7 +99,7 @@ impl Recorded<'_> {
         catalog: &mut Catalog,
         rank: u32,
     ) -> Result<Option<SizeField>, PipelineError> {
-        match catalog.blob(blob::FIELD + rank)? {
+        match catalog.blob(Blob::SubdomainField(rank))? {
             Some(bytes) => Ok(Some(SizeField::from_bytes_in(&bytes, self.room)?)),
             None => Ok(None),
         }
@@ -154,7 +154,7 @@ impl Recorded<'_> {
         memory: u64,
     ) -> Result<bool, PipelineError> {
         // What was asked for last time and is asked for again changes nothing, however it came out.
-        let asked = catalog.blob(blob::ASKED + rank)?;
+        let asked = catalog.blob(Blob::Request(rank))?;
         if sizes.factor == 1.0 && asked.as_deref() == Some(sizes.asked.as_bytes()) {
             return Ok(false);
         }

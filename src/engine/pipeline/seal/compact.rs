@@ -6,12 +6,12 @@
 //! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
 
 use tetdb_schema::ids::{Owner, VertexId};
-use tetdb_schema::leaf::TetPlace;
 use tetdb_schema::page::{NONE, RECORDS};
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
+use tetdb_schema::unsealed::TetLinks;
 
 use super::neighbors::Neighbors;
-use super::records::{Claim, RequiredFace, TetRecord};
+use super::records::{InputFace, RequiredTetFace, TetRecord};
 use super::target::SealTarget;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
@@ -149,7 +149,7 @@ fn tets(
     target: &SealTarget,
     writer: &mut SealedWriter,
     watch: &Watcher,
-) -> Result<Sorted<RequiredFace>, PipelineError> {
+) -> Result<Sorted<RequiredTetFace>, PipelineError> {
     let mut faces = Sorter::new(target.scratch, target.memory / 4);
     let (mut order, mut done) = ((0..).zip(order).peekable(), 0);
     while order.peek().is_some() {
@@ -158,9 +158,9 @@ fn tets(
             done = u64::from(t) + 1;
             for i in (0..4).filter(|i| record.required >> i & 1 != 0) {
                 let (vertices, odd) = sorted_face(FACES[i].map(|k| record.nodes[k]));
-                faces.push(RequiredFace { vertices, tet: t, odd })?;
+                faces.push(RequiredTetFace { vertices, tet: t, odd })?;
             }
-            let place = TetPlace {
+            let place = TetLinks {
                 neighbors: match neighbors {
                     Some(neighbors) => neighbors.next()?,
                     None => [NONE; 4],
@@ -180,7 +180,7 @@ fn tets(
 /// Joins facets and interface faces with the faces of tetrahedra; all ascend by their sorted vertices.
 fn facets<P: Pages>(
     mesh: &mut Mesh<P>,
-    faces: Sorted<RequiredFace>,
+    faces: Sorted<RequiredTetFace>,
     target: &SealTarget,
     writer: &mut SealedWriter,
 ) -> Result<(), PipelineError> {
@@ -199,16 +199,17 @@ fn facets<P: Pages>(
     // A face may be both a facet and an interface face: what was read stays at hand.
     let (mut at, mut sides) = ([0; 3], [NONE; 2]);
     // Facets of a wall given from both sides: each names the tetrahedron behind it, so both keep their labels.
-    let is_pair =
-        |a: &Claim, b: &Claim| a.vertices == b.vertices && !a.at_interface && !b.at_interface;
-    let mut last: Option<Claim> = None;
+    let is_pair = |a: &InputFace, b: &InputFace| {
+        a.vertices == b.vertices && !a.at_interface && !b.at_interface
+    };
+    let mut last: Option<InputFace> = None;
     let mut all = sorter.finish()?.peekable();
     while let Some(claim) = all.next() {
         let claim = claim?;
         if claim.vertices != at || sides == [NONE; 2] {
             sides = [NONE; 2];
             at = claim.vertices;
-            let is_up_to = |face: &RequiredFace| face.vertices <= claim.vertices;
+            let is_up_to = |face: &RequiredTetFace| face.vertices <= claim.vertices;
             while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, is_up_to)) {
                 let face = face?;
                 if face.vertices == claim.vertices {
@@ -232,9 +233,9 @@ fn facets<P: Pages>(
     Ok(())
 }
 
-fn claim(vertices: [u32; 3], number: u32, at_interface: bool) -> Claim {
+fn claim(vertices: [u32; 3], number: u32, at_interface: bool) -> InputFace {
     let (vertices, odd) = sorted_face(vertices);
-    Claim { vertices, number, odd, at_interface }
+    InputFace { vertices, number, odd, at_interface }
 }
 
 fn push_facet<P: Pages>(

@@ -2,7 +2,7 @@
 
 use tetdb_schema::page::NONE;
 
-use super::records::{Link, TetFace, TetRecord};
+use super::records::{NeighborLink, SortedTetFace, TetRecord};
 use super::target::SealTarget;
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::{Sorted, Sorter, check_cancelled};
@@ -12,7 +12,7 @@ use tetdb_store::sealed::sorted_face;
 /// The four neighbors of each tetrahedron in turn.
 pub struct Neighbors {
     /// Of every face with another side.
-    links: std::iter::Peekable<Sorted<Link>>,
+    links: std::iter::Peekable<Sorted<NeighborLink>>,
     tet: u32,
 }
 
@@ -26,21 +26,21 @@ impl Neighbors {
             for (i, corners) in FACES.into_iter().enumerate() {
                 let (vertices, _) = sorted_face(corners.map(|k| nodes[k]));
                 let place = (t as u32) << 2 | i as u32;
-                faces.push(TetFace { vertices, place })?;
+                faces.push(SortedTetFace { vertices, place })?;
             }
             if t & 0xffff == 0 {
                 check_cancelled();
             }
         }
         let mut links = Sorter::new(target.scratch, memory);
-        let mut open = None::<TetFace>;
+        let mut open = None::<SortedTetFace>;
         for face in faces.finish()? {
             let face = face?;
             match open.take() {
                 Some(before) if before.vertices == face.vertices => {
                     let [from, to] = [before.place, face.place];
-                    links.push(Link { from, to })?;
-                    links.push(Link { from: to, to: from })?;
+                    links.push(NeighborLink { from, to })?;
+                    links.push(NeighborLink { from: to, to: from })?;
                 }
                 _ => open = Some(face),
             }
@@ -52,7 +52,7 @@ impl Neighbors {
     pub fn next(&mut self) -> Result<[u32; 4], PipelineError> {
         let mut four = [NONE; 4];
         let tet = self.tet;
-        let is_here = |link: &Result<Link, _>| match link {
+        let is_here = |link: &Result<NeighborLink, _>| match link {
             Ok(link) => link.from >> 2 == tet,
             Err(_) => true,
         };

@@ -1,4 +1,4 @@
-//! What is sorted while a sub-domain is sealed.
+//! Records that are sorted while a sub-domain is sealed.
 
 use tetdb_base::storage::sort_record;
 
@@ -16,22 +16,22 @@ sort_record! {
 
 sort_record! {
     /// A required face of a tetrahedron.
-    pub struct RequiredFace {
+    pub struct RequiredTetFace {
         /// Ascending.
         pub vertices: [u32; 3],
         pub tet: u32,
-        /// Whether ascending order is odd in the tetrahedron.
+        /// True if the ascending order is odd in the tetrahedron.
         pub odd: bool,
     }
 }
 
 sort_record! {
     /// A facet or an interface face, which is a required face of its tetrahedra.
-    pub struct Claim {
+    pub struct InputFace {
         /// Ascending.
         pub vertices: [u32; 3],
         pub number: u32,
-        /// Whether ascending order is odd in it.
+        /// True if the ascending order is odd in the facet or interface face.
         pub odd: bool,
         /// An interface face, not a facet.
         pub at_interface: bool,
@@ -40,7 +40,7 @@ sort_record! {
 
 sort_record! {
     /// A face of a tetrahedron.
-    pub struct TetFace {
+    pub struct SortedTetFace {
         /// Ascending.
         pub vertices: [u32; 3],
         /// 4 · tetrahedron + face.
@@ -50,7 +50,7 @@ sort_record! {
 
 sort_record! {
     /// Two sides of a face, each as 4 · tetrahedron + face.
-    pub struct Link {
+    pub struct NeighborLink {
         pub from: u32,
         pub to: u32,
     }

@@ -6,7 +6,7 @@ use tetdb_schema::ids::SubdomainId;
 
 use tetdb_base::geom::Aabb;
 use tetdb_base::storage::DiskPath;
-use tetdb_kernel::topology::OppositeOwners;
+use tetdb_schema::topology::FacesAcross;
 use tetdb_store::sealed::Form;
 
 /// Where and how to seal.
@@ -19,6 +19,6 @@ pub struct SealTarget<'a> {
     /// Bytes for sort runs and for the writer together.
     pub memory: u64,
     pub bounds: Aabb,
-    /// Who has the other side of its interface faces, by cut; without them interface faces are left out.
-    pub owners: Option<&'a BTreeMap<u32, OppositeOwners>>,
+    /// Owners of the other side of its interface faces, by cut; without owners, interface faces are left out.
+    pub owners: Option<&'a BTreeMap<u32, FacesAcross>>,
 }

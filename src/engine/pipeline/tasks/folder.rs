@@ -4,18 +4,11 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use rkyv::api::high::{HighDeserializer, HighSerializer, HighValidator};
-use rkyv::bytecheck::CheckBytes;
-use rkyv::rancor::Error;
-use rkyv::ser::allocator::ArenaHandle;
-use rkyv::util::AlignedVec;
-use rkyv::{Archive, Deserialize, Serialize};
-
-use super::records::{Mark, PlanRecord};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::RECIPE;
-use crate::pipeline::work::{Kind, body, from_bytes, head, to_bytes};
 use tetdb_base::storage::{DiskPath, StorageError, check_cancelled, host_name};
+use tetdb_schema::archive::Archivable;
+use tetdb_schema::work::{PlanRecord, TaskMark, WorkKind, body, from_bytes, head, to_bytes};
 
 /// Between two looks for a file that is late.
 const LOOK_AGAIN: Duration = Duration::from_millis(250);
@@ -115,7 +108,7 @@ impl TaskFolder {
             .until(|| read(&path))?
             .ok_or_else(|| no_plan("nobody has planned tasks for it".to_owned()))?;
         let plan: PlanRecord =
-            from_bytes(Kind::Plan, &bytes).map_err(|e| no_plan(format!("its plan: {e}")))?;
+            from_bytes(WorkKind::Plan, &bytes).map_err(|e| no_plan(format!("its plan: {e}")))?;
         match plan.recipe {
             RECIPE => Ok(plan),
             other => Err(no_plan(format!(
@@ -131,12 +124,12 @@ impl TaskFolder {
         Ok(text.trim().parse().unwrap_or(0))
     }
 
-    pub fn mark(&self, task: u32) -> Option<Mark> {
+    pub fn mark(&self, task: u32) -> Option<TaskMark> {
         let bytes = read(&self.mark_path(task)).ok()??;
         serde_json::from_slice(&bytes).ok()
     }
 
-    pub fn set_mark(&self, task: u32, mark: &Mark) -> Result<(), StorageError> {
+    pub fn set_mark(&self, task: u32, mark: &TaskMark) -> Result<(), StorageError> {
         let text = serde_json::to_vec(mark).unwrap_or_default();
         write(&self.mark_path(task), &[&text])
     }
@@ -146,13 +139,13 @@ impl TaskFolder {
         let path = self.field_path();
         let mut bytes =
             (patience.until(|| read(&path))?).ok_or_else(|| damaged(&path, "it is missing"))?;
-        let length = body(Kind::SizeField, &bytes).map_err(|e| damaged(&path, &e))?.len();
+        let length = body(WorkKind::SizeField, &bytes).map_err(|e| damaged(&path, &e))?.len();
         bytes.drain(..bytes.len() - length);
         Ok(bytes)
     }
 
     pub fn set_field(&self, field: &[u8]) -> Result<(), StorageError> {
-        write(&self.field_path(), &[&head(Kind::SizeField, field), field])
+        write(&self.field_path(), &[&head(WorkKind::SizeField, field), field])
     }
 }
 
@@ -176,15 +169,10 @@ pub(super) fn read(path: &DiskPath) -> Result<Option<Vec<u8>>, StorageError> {
 }
 
 /// A record of a file; `None` where there is none. Errors: in words what is wrong with it.
-pub(super) fn read_record<T>(
+pub(super) fn read_record<T: Archivable>(
     path: &DiskPath,
-    kind: Kind,
-) -> Result<Option<Result<T, String>>, StorageError>
-where
-    T: Archive,
-    T::Archived:
-        for<'a> CheckBytes<HighValidator<'a, Error>> + Deserialize<T, HighDeserializer<Error>>,
-{
+    kind: WorkKind,
+) -> Result<Option<Result<T, String>>, StorageError> {
     Ok(read(path)?.map(|bytes| from_bytes(kind, &bytes)))
 }
 
@@ -199,10 +187,11 @@ pub(super) fn write(path: &DiskPath, bytes: &[&[u8]]) -> Result<(), StorageError
     end_draft(&draft, path, written)
 }
 
-pub(super) fn write_record<T>(path: &DiskPath, kind: Kind, record: &T) -> Result<(), StorageError>
-where
-    T: for<'a> Serialize<HighSerializer<AlignedVec, ArenaHandle<'a>, Error>>,
-{
+pub(super) fn write_record(
+    path: &DiskPath,
+    kind: WorkKind,
+    record: &impl Archivable,
+) -> Result<(), StorageError> {
     write(path, &[&to_bytes(kind, record)])
 }
 

@@ -6,7 +6,6 @@ use std::ops::Range;
 use std::time::Duration;
 
 use super::folder::{Patience, TaskFolder, copy, damaged, read_record, write, write_record};
-use super::records::{PlanRecord, TaskOrders, TaskReceipts};
 use super::schedule::{Stage, StageKind, stages};
 use super::status::is_being_worked;
 use crate::pipeline::error::PipelineError;
@@ -14,10 +13,14 @@ use crate::pipeline::mesh::commit::{
     close, commit_cuts, commit_subdomain, cut_order, subdomain_order,
 };
 use crate::pipeline::plan::RECIPE;
-use crate::pipeline::tree::{self, PartMesh, TreePart, blob};
-use crate::pipeline::work::{CutReceipt, Kind, Order, Receipt};
+use crate::pipeline::tree;
 use tetdb_base::storage::{DiskPath, StorageError, attempt};
+use tetdb_schema::blob::Blob;
 use tetdb_schema::catalog::StoreState;
+use tetdb_schema::tree::{RankRange, SubtreeMesh};
+use tetdb_schema::work::{
+    CutReceipt, PlanRecord, Receipt, TaskOrders, TaskReceipts, WorkKind, WorkOrder,
+};
 use tetdb_store::store::{Catalog, StoreError};
 
 /// What a call of [`gather`] found and did.
@@ -88,9 +91,9 @@ pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), Pipe
             folder.dir.remove_dir_all()?;
         }
         folder.dir.create_dir_all()?;
-        let field = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+        let field = catalog.blob(Blob::SizeField)?.unwrap_or_default();
         folder.set_field(&field)?;
-        write_record(&folder.plan_path(), Kind::Plan, &plan)?;
+        write_record(&folder.plan_path(), WorkKind::Plan, &plan)?;
         Ok(())
     })?
 }
@@ -154,14 +157,12 @@ impl GatherRun<'_> {
 
     /// Tasks of a stage that are not committed.
     fn open_tasks(&mut self, stage: &Stage) -> Result<Vec<u32>, PipelineError> {
-        let parts = tree::parts(self.catalog, self.plan.n)?;
+        let parts = tree::subtrees(self.catalog, self.plan.n)?;
         let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
-        let is_open = |part: TreePart| match stage.kind {
-            StageKind::Cuts => parts.iter().any(|p| p.part == part),
+        let is_open = |part: RankRange| match stage.kind {
+            StageKind::Cuts => parts.iter().any(|p| p.ranks == part),
             StageKind::Subtrees => wide_within(&parts, part).next().is_some(),
-            StageKind::Subdomains => {
-                (part.first..part.first + part.count).any(|r| !sealed.contains(&r))
-            }
+            StageKind::Subdomains => part.ranks().any(|r| !sealed.contains(&r)),
         };
         let tasks = stage.tasks().zip(&stage.parts);
         Ok(tasks.filter(|(_, part)| is_open(**part)).map(|(task, _)| task).collect())
@@ -179,7 +180,7 @@ impl GatherRun<'_> {
             false => Patience::of(Duration::ZERO),
         };
         let look = || {
-            let found = read_record::<TaskReceipts>(&path, Kind::Receipts)?;
+            let found = read_record::<TaskReceipts>(&path, WorkKind::Receipts)?;
             Ok(found.filter(|found| found.as_ref().map_or(true, |r| r.run == self.plan.run)))
         };
         let receipts = match patience.until(look)? {
@@ -237,7 +238,7 @@ impl GatherRun<'_> {
         let Some(top) = cuts.first() else {
             return Ok(());
         };
-        let parts = tree::parts(self.catalog, self.plan.n)?;
+        let parts = tree::subtrees(self.catalog, self.plan.n)?;
         match parts.contains(&top.parent) {
             true => commit_cuts(self.catalog, &cuts),
             false => Err(damaged(
@@ -250,19 +251,19 @@ impl GatherRun<'_> {
     fn give_orders(&mut self, stage: &Stage, task: u32) -> Result<(), PipelineError> {
         let part = stage.part(task).expect("a task of the stage");
         let n = self.plan.n;
-        let parts = tree::parts(self.catalog, n)?;
+        let parts = tree::subtrees(self.catalog, n)?;
         let mut orders = Vec::new();
         if stage.kind == StageKind::Subdomains {
             let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
-            let within = part.first..part.first + part.count;
-            for part in parts.iter().filter(|p| within.contains(&p.part.first)) {
-                if !sealed.contains(&part.part.first) {
-                    orders.push(Order::Subdomain(subdomain_order(self.catalog, n, *part)?));
+            let within = part.ranks();
+            for part in parts.iter().filter(|p| within.contains(&p.ranks.first)) {
+                if !sealed.contains(&part.ranks.first) {
+                    orders.push(WorkOrder::Subdomain(subdomain_order(self.catalog, n, *part)?));
                 }
             }
         } else {
             for part in wide_within(&parts, part) {
-                orders.push(Order::Cut(cut_order(self.catalog, n, *part)?));
+                orders.push(WorkOrder::Cut(cut_order(self.catalog, n, *part)?));
             }
         }
         let record = TaskOrders {
@@ -271,14 +272,14 @@ impl GatherRun<'_> {
             orders,
             below: stage.kind == StageKind::Subtrees,
         };
-        Ok(write_record(&self.folder.orders_path(task), Kind::Orders, &record)?)
+        Ok(write_record(&self.folder.orders_path(task), WorkKind::Orders, &record)?)
     }
 }
 
 /// Parts within another that are to be cut.
-fn wide_within(parts: &[PartMesh], part: TreePart) -> impl Iterator<Item = &PartMesh> {
-    let within = part.first..part.first + part.count;
-    (parts.iter()).filter(move |p| p.part.count > 1 && within.contains(&p.part.first))
+fn wide_within(parts: &[SubtreeMesh], part: RankRange) -> impl Iterator<Item = &SubtreeMesh> {
+    let within = part.ranks();
+    (parts.iter()).filter(move |p| p.ranks.count > 1 && within.contains(&p.ranks.first))
 }
 
 /// Gives a file a second name, so that nothing is lost if the commit does not follow. Where a disk knows no second names it is copied.

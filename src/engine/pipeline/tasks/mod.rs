@@ -18,7 +18,6 @@
 mod folder;
 mod gather;
 mod perform;
-mod records;
 mod schedule;
 mod serve;
 mod status;

@@ -9,18 +9,20 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use super::folder::{
     Patience, TaskFolder, attempt_name, copy, damaged, read_record, scratch_in, write_record,
 };
-use super::records::{Mark, PlanRecord, TaskOrders, TaskReceipts};
 use super::schedule::stages;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::{MeshOptions, Options, Plan};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::tree::ZoneRow;
 use crate::pipeline::work::common::Common;
-use crate::pipeline::work::{Kind, Order, Receipt, Worker, Workplace};
+use crate::pipeline::work::{Worker, Workplace};
 use crate::pipeline::workers::{Hand, work_off};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Budget, DiskPath, ScratchSpace, StorageError, attempt, host_name};
 use tetdb_kernel::sizing::SizeField;
+use tetdb_schema::tree::CutPlane;
+use tetdb_schema::work::{
+    PlanRecord, Receipt, TaskMark, TaskOrders, TaskReceipts, WorkKind, WorkOrder,
+};
 use tetdb_store::store::Catalog;
 
 /// Between two marks that a task lives.
@@ -68,7 +70,7 @@ pub fn perform(
         }
         let orders = orders_of(&folder, &plan, task, patience)?;
         let is_alive =
-            Mark { host: host_name(), process: std::process::id(), renewed: 0, error: None };
+            TaskMark { host: host_name(), process: std::process::id(), renewed: 0, error: None };
         let done = marked(&folder, task, &is_alive, || {
             Attempt::new(&folder, &plan, orders, settings).run(patience, budget, watch)
         });
@@ -77,7 +79,7 @@ pub fn perform(
             Err(error) => {
                 let error = Some(error.to_string());
                 // The error itself is what counts.
-                let _ = folder.set_mark(task, &Mark { error, ..is_alive });
+                let _ = folder.set_mark(task, &TaskMark { error, ..is_alive });
             }
         }
         done.map(Performed::Done)
@@ -86,7 +88,7 @@ pub fn perform(
 
 /// Whether there are receipts of this plan for the task, with their files.
 fn is_done(folder: &TaskFolder, plan: &PlanRecord, task: u32) -> Result<bool, StorageError> {
-    let found = read_record::<TaskReceipts>(&folder.receipts_path(task), Kind::Receipts)?;
+    let found = read_record::<TaskReceipts>(&folder.receipts_path(task), WorkKind::Receipts)?;
     Ok(found.is_some_and(|found| {
         found.is_ok_and(|receipts| {
             let dir = folder.files_dir(&receipts.attempt);
@@ -105,7 +107,7 @@ fn orders_of(
 ) -> Result<TaskOrders, PipelineError> {
     let path = folder.orders_path(task);
     let found = patience.until(|| {
-        let found = read_record::<TaskOrders>(&path, Kind::Orders)?;
+        let found = read_record::<TaskOrders>(&path, WorkKind::Orders)?;
         // Those of an earlier plan are as good as none.
         Ok(found.filter(|found| found.as_ref().map_or(true, |orders| orders.run == plan.run)))
     })?;
@@ -121,7 +123,7 @@ fn orders_of(
 }
 
 /// Does `work` and says all the while that it is alive.
-fn marked<T>(folder: &TaskFolder, task: u32, mark: &Mark, work: impl FnOnce() -> T) -> T {
+fn marked<T>(folder: &TaskFolder, task: u32, mark: &TaskMark, work: impl FnOnce() -> T) -> T {
     std::thread::scope(|scope| {
         let (stop, stopped) = channel::<()>();
         scope.spawn(move || {
@@ -129,7 +131,7 @@ fn marked<T>(folder: &TaskFolder, task: u32, mark: &Mark, work: impl FnOnce() ->
                 let now = SystemTime::now().duration_since(UNIX_EPOCH);
                 let renewed = now.unwrap_or_default().as_secs();
                 // For others to look at: the work goes on without it.
-                let _ = folder.set_mark(task, &Mark { renewed, ..mark.clone() });
+                let _ = folder.set_mark(task, &TaskMark { renewed, ..mark.clone() });
                 if stopped.recv_timeout(RENEWED_EVERY) != Err(RecvTimeoutError::Timeout) {
                     return;
                 }
@@ -141,7 +143,7 @@ fn marked<T>(folder: &TaskFolder, task: u32, mark: &Mark, work: impl FnOnce() ->
 }
 
 /// What an order did, and the zones above it where the cuts below it belong to the task.
-type Below = (Option<Vec<ZoneRow>>, Receipt);
+type Below = (Option<Vec<CutPlane>>, Receipt);
 
 /// One attempt at a task.
 struct Attempt<'a> {
@@ -198,7 +200,7 @@ impl<'a> Attempt<'a> {
                 receipts,
                 seconds: clock.elapsed().as_secs_f64(),
             };
-            write_record(&self.folder.receipts_path(record.task), Kind::Receipts, &record)?;
+            write_record(&self.folder.receipts_path(record.task), WorkKind::Receipts, &record)?;
             Ok(n)
         })();
         if let Some(local) = &self.local {
@@ -245,24 +247,24 @@ impl<'a> Attempt<'a> {
         let (first, later) = (at_once(orders.len()), at_once(usize::MAX));
         let jobs = orders.iter().rev().map(|order| (order.clone(), first));
         let mut receipts = Vec::new();
-        let run = &|(order, share): (Order, Plan), watch: &Watcher| {
+        let run = &|(order, share): (WorkOrder, Plan), watch: &Watcher| {
             let zones = match &order {
-                Order::Cut(cut) if self.orders.below => Some(cut.zones.clone()),
+                WorkOrder::Cut(cut) if self.orders.below => Some(cut.zones.clone()),
                 _ => None,
             };
             Ok((zones, worker.perform(order, share, watch)?))
         };
         work_off(
             jobs.collect(),
-            &vec![run as Hand<(Order, Plan), Below>; share.workers()],
+            &vec![run as Hand<(WorkOrder, Plan), Below>; share.workers()],
             watch,
             &mut |(zones, receipt)| {
                 let mut next = Vec::new();
                 if let (Some(zones), Receipt::Cut(cut)) = (zones, &receipt) {
                     // What is in the store stays; only what this attempt wrote and has cut since is of no use any more.
-                    let parent = Catalog::file_name(cut.parent.part.first, cut.parent.generation);
+                    let parent = Catalog::file_name(cut.parent.ranks.first, cut.parent.generation);
                     output.join(parent).remove_file()?;
-                    next.extend(cut.below(&zones).map(|order| (Order::Cut(order), later)));
+                    next.extend(cut.below(&zones).map(|order| (WorkOrder::Cut(order), later)));
                     next.reverse();
                 }
                 receipts.push(receipt);
@@ -270,7 +272,7 @@ impl<'a> Attempt<'a> {
             },
         )?;
         receipts.sort_by_key(|receipt| match receipt {
-            Receipt::Cut(cut) => (cut.parent.part.first, Reverse(cut.parent.part.count)),
+            Receipt::Cut(cut) => (cut.parent.ranks.first, Reverse(cut.parent.ranks.count)),
             Receipt::Subdomain(sub) => (sub.row.rank, Reverse(1)),
         });
         Ok(receipts)
@@ -298,7 +300,7 @@ impl<'a> Attempt<'a> {
         let mut names: BTreeSet<String> = receipts.iter().flat_map(Receipt::files).collect();
         for receipt in receipts {
             if let Receipt::Cut(cut) = receipt {
-                names.remove(&Catalog::file_name(cut.parent.part.first, cut.parent.generation));
+                names.remove(&Catalog::file_name(cut.parent.ranks.first, cut.parent.generation));
             }
         }
         let mut files = Vec::with_capacity(names.len());

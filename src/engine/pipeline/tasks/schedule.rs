@@ -1,6 +1,6 @@
 //! Which task does what: it follows from the number of sub-domains and of tasks alone.
 
-use crate::pipeline::tree::TreePart;
+use tetdb_schema::tree::RankRange;
 
 /// Most tasks of one stage: batch schedulers have arrays of 1,000 by default.
 pub const TASKS_MAX: u32 = 1000;
@@ -24,7 +24,7 @@ pub struct Stage {
     /// Number of the first task; numbers go on from stage to stage, from 1.
     pub first: u32,
     /// What each of them does it to.
-    pub parts: Vec<TreePart>,
+    pub parts: Vec<RankRange>,
 }
 
 impl Stage {
@@ -34,7 +34,7 @@ impl Stage {
     }
 
     /// The part of a task of this stage.
-    pub fn part(&self, task: u32) -> Option<TreePart> {
+    pub fn part(&self, task: u32) -> Option<RankRange> {
         let at = task.checked_sub(self.first)?;
         self.parts.get(at as usize).copied()
     }
@@ -44,21 +44,21 @@ impl Stage {
 pub fn stages(n: u32, tasks: u32) -> Vec<Stage> {
     let tasks = tasks.clamp(1, TASKS_MAX);
     let mut stages: Vec<Stage> = Vec::new();
-    let mut add = |kind, parts: Vec<TreePart>| {
+    let mut add = |kind, parts: Vec<RankRange>| {
         let first = stages.last().map_or(1, |stage| stage.tasks().end);
         stages.push(Stage { kind, first, parts });
     };
-    let is_wide = |part: &TreePart| part.count > 1;
-    let mut level = vec![TreePart { first: 0, count: n }];
+    let is_wide = |part: &RankRange| part.count > 1;
+    let mut level = vec![RankRange { first: 0, count: n }];
     while level.iter().any(is_wide) {
-        let wide: Vec<TreePart> = level.iter().copied().filter(is_wide).collect();
+        let wide: Vec<RankRange> = level.iter().copied().filter(is_wide).collect();
         let enough = level.len() >= tasks as usize || 2 * level.len() > TASKS_MAX as usize;
         if enough {
             add(StageKind::Subtrees, wide);
             break;
         }
         add(StageKind::Cuts, wide);
-        let children = |part: TreePart| match part.count {
+        let children = |part: RankRange| match part.count {
             1 => vec![part],
             _ => part.children().to_vec(),
         };
@@ -66,7 +66,7 @@ pub fn stages(n: u32, tasks: u32) -> Vec<Stage> {
     }
     let batches = tasks.min(n);
     let at = |k: u32| (u64::from(n) * u64::from(k) / u64::from(batches)) as u32;
-    let batch = |k| TreePart { first: at(k), count: at(k + 1) - at(k) };
+    let batch = |k| RankRange { first: at(k), count: at(k + 1) - at(k) };
     add(StageKind::Subdomains, (0..batches).map(batch).collect());
     stages
 }
@@ -88,7 +88,7 @@ mod tests {
                     next = stage.tasks().end;
                     assert!(stage.parts.len() <= TASKS_MAX as usize, "{n} by {tasks}");
                     for part in &stage.parts {
-                        let ends = part.first..part.first + part.count;
+                        let ends = part.ranks();
                         match stage.kind {
                             StageKind::Cuts => cuts.push(part.cut()),
                             StageKind::Subtrees => cuts.extend(ends.skip(1)),

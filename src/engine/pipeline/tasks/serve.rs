@@ -5,36 +5,24 @@ use std::sync::mpsc::channel;
 use std::time::Duration;
 use tetdb_schema::code::Code;
 
-use rkyv::{Archive, Deserialize, Serialize};
-
 use super::folder::{Patience, TaskFolder, attempt_name, copy, damaged, scratch_in};
 use super::perform::TaskSettings;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::{MeshOptions, Options, Plan, RECIPE};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::tree::blob;
+use crate::pipeline::tree::corners;
 use crate::pipeline::work::common::Common;
-use crate::pipeline::work::{
-    Helpers, Kind, Order, Receipt, Worker, Workplace, from_bytes, to_bytes,
-};
+use crate::pipeline::work::{Helpers, Worker, Workplace};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::RemoteFailure;
 use tetdb_base::storage::{Budget, DiskPath, RunContext, ScratchSpace, attempt};
 use tetdb_kernel::sizing::SizeField;
+use tetdb_schema::blob::Blob;
+use tetdb_schema::work::{Receipt, RunRecord, WorkKind, WorkOrder, from_bytes, to_bytes};
 use tetdb_store::store::Catalog;
 
 /// How long files of other machines may be late.
 const WAIT: Duration = Duration::from_secs(60);
-
-/// What is the same for all orders.
-#[derive(Archive, Serialize, Deserialize, Clone, Debug)]
-struct Job {
-    recipe: u32,
-    store: String,
-    bounds: [[f64; 3]; 2],
-    /// As JSON.
-    options: String,
-}
 
 /// Begins with helpers; how many orders they do at once. Effects: the size field is in the store's folder of tasks. Errors: the disk; theirs.
 pub fn begin(
@@ -44,28 +32,28 @@ pub fn begin(
     bounds: &Aabb,
 ) -> Result<usize, PipelineError> {
     let dir = std::path::absolute(catalog.dir()).unwrap_or_else(|_| catalog.dir().to_owned());
-    let field = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+    let field = catalog.blob(Blob::SizeField)?.unwrap_or_default();
     let folder = TaskFolder::of(catalog.work_dir());
     folder.dir.create_dir_all()?;
     folder.set_field(&field)?;
-    let job = Job {
+    let run = RunRecord {
         recipe: RECIPE,
         store: dir.to_string_lossy().into_owned(),
-        bounds: [bounds.low, bounds.high].map(|p| p.to_array()),
+        bounds: corners(bounds),
         options: serde_json::to_string(&options.mesh).unwrap_or_default(),
     };
-    Ok(helpers.begin(&to_bytes(Kind::Plan, &job))?)
+    Ok(helpers.begin(&to_bytes(WorkKind::Plan, &run))?)
 }
 
 /// Has an order done by a helper; its files are there then. Errors: theirs; a receipt that cannot be read.
 pub fn ask(
     helpers: &dyn Helpers,
     slot: usize,
-    order: &Order,
+    order: &WorkOrder,
     store: &DiskPath,
 ) -> Result<Receipt, PipelineError> {
-    let bytes = helpers.perform(slot, to_bytes(Kind::Orders, order))?;
-    let receipt: Receipt = from_bytes(Kind::Receipts, &bytes)
+    let bytes = helpers.perform(slot, to_bytes(WorkKind::Orders, order))?;
+    let receipt: Receipt = from_bytes(WorkKind::Receipts, &bytes)
         .map_err(|e| damaged(store, &format!("a receipt: {e}")))?;
     let patience = Patience::of(WAIT);
     for name in receipt.files() {
@@ -100,8 +88,8 @@ pub fn serve(
     answer: &(dyn Fn(usize, Result<Vec<u8>, PipelineError>) + Sync),
 ) -> Result<(), PipelineError> {
     let patience = Patience::of(settings.wait);
-    let store_of = |job: &Job| DiskPath::from(Path::new(&job.store));
-    let job: Job = from_bytes(Kind::Plan, job)
+    let store_of = |job: &RunRecord| DiskPath::from(Path::new(&job.store));
+    let job: RunRecord = from_bytes(WorkKind::Plan, job)
         .map_err(|e| damaged(&DiskPath::from(Path::new(".")), &format!("the job: {e}")))?;
     let store = store_of(&job);
     if job.recipe != RECIPE {
@@ -138,7 +126,8 @@ pub fn serve(
     };
     let one = |order: &[u8], watch: &Watcher| {
         attempt(|| {
-            let order: Order = from_bytes(Kind::Orders, order).map_err(|e| damaged(&store, &e))?;
+            let order: WorkOrder =
+                from_bytes(WorkKind::Orders, order).map_err(|e| damaged(&store, &e))?;
             let patience = Patience::of(settings.wait);
             wait_for(&store.join(order.input()), patience)?;
             let receipt = worker.perform(order, share, watch)?;
@@ -153,7 +142,7 @@ pub fn serve(
                 }
             }
             store.sync_dir()?;
-            Ok(to_bytes(Kind::Receipts, &receipt))
+            Ok(to_bytes(WorkKind::Receipts, &receipt))
         })?
     };
     started(slots);

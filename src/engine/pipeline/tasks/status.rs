@@ -5,11 +5,10 @@ use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use super::folder::{Patience, TaskFolder, read_record};
-use super::records::{Mark, TaskReceipts};
 use super::schedule::{Stage, stages};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::work::Kind;
 use tetdb_base::storage::{StorageError, is_process_gone};
+use tetdb_schema::work::{TaskMark, TaskReceipts, WorkKind};
 use tetdb_store::store::Catalog;
 
 /// A task that has not said for so long that it lives is taken for dead: twelve times what it takes to say so.
@@ -107,7 +106,7 @@ pub fn status(store: &Path) -> Result<Option<Planned>, PipelineError> {
 }
 
 fn state(folder: &TaskFolder, run: u64, task: u32) -> Result<TaskState, StorageError> {
-    let found = read_record::<TaskReceipts>(&folder.receipts_path(task), Kind::Receipts)?;
+    let found = read_record::<TaskReceipts>(&folder.receipts_path(task), WorkKind::Receipts)?;
     let mark = folder.mark(task);
     Ok(match (found, mark) {
         (Some(Ok(receipts)), _) if receipts.run == run => {
@@ -116,7 +115,7 @@ fn state(folder: &TaskFolder, run: u64, task: u32) -> Result<TaskState, StorageE
         (Some(Err(why)), _) => {
             TaskState::Failed { why: format!("its receipt cannot be used: {why}") }
         }
-        (_, Some(Mark { host, error: Some(error), .. })) => {
+        (_, Some(TaskMark { host, error: Some(error), .. })) => {
             TaskState::Failed { why: format!("on {host}: {error}") }
         }
         (_, Some(mark)) if is_alive(&mark) => TaskState::Running { host: mark.host },
@@ -127,7 +126,7 @@ fn state(folder: &TaskFolder, run: u64, task: u32) -> Result<TaskState, StorageE
     })
 }
 
-fn is_alive(mark: &Mark) -> bool {
+fn is_alive(mark: &TaskMark) -> bool {
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
     let now = now.unwrap_or_default().as_secs();
     mark.error.is_none()

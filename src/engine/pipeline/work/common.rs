@@ -1,4 +1,4 @@
-//! What is the same for all parts of a run.
+//! Parameters common to all orders of a run.
 
 use crate::pipeline::plan::Options;
 use tetdb_base::geom::Aabb;
@@ -7,7 +7,7 @@ use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::SizeField;
 use tetdb_store::sealed::Form;
 
-/// What is the same for all parts of a run.
+/// Parameters common to all orders of a run.
 #[derive(Clone, Copy)]
 pub struct Common<'a> {
     pub field: &'a SizeField,
@@ -15,9 +15,9 @@ pub struct Common<'a> {
     pub method: Method,
     pub bounds: Aabb,
     pub form: Form,
-    /// Whether what sub-domains are meshed from is kept.
+    /// True if coarse snapshots are kept.
     pub keeps_coarse: bool,
-    /// Whether meshes on their way are kept to be looked at.
+    /// True if stages of cuts are kept.
     pub keeps_stages: bool,
 }
 

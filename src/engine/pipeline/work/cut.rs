@@ -1,28 +1,28 @@
-//! One bisection: the part's file in, the files of its two children out.
+//! One bisection: the file of a subtree in, the files of its two children out.
 
 use std::time::Instant;
 
 use super::common::Common;
 use super::cut_journal::CutJournal;
-use super::order::CutOrder;
-use super::receipt::InheritedFace;
-use super::receipt::{CutReceipt, Traffic};
 use super::soundness::panic_is_damage_of;
 use super::stages::{StageFiles, Stages};
+use super::traffic::traffic_of;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::{Event, Watcher};
-use crate::pipeline::tree::{DONE, PartMesh, TreePart, open_part};
+use crate::pipeline::tree::{DONE, open_subtree};
 use tetdb_base::storage::{Backing, DiskPath, Pager, PagerStats, attempt};
 use tetdb_kernel::bisect::{self, CutPlan, CutReport, OpenCut, Zone};
 use tetdb_kernel::mesh::{Mesh, Workspace};
 use tetdb_kernel::optimize::Settings;
 use tetdb_schema::catalog::Stage;
+use tetdb_schema::tree::{RankRange, SubtreeMesh};
+use tetdb_schema::work::{CutOrder, CutReceipt, InheritedFace};
 
-/// What it takes to bisect a part.
+/// The bisection of a subtree.
 pub struct CutJob<'a> {
     pub order: &'a CutOrder,
-    /// The part's file, and those of its children.
+    /// The file of the subtree, and those of its children.
     pub base: DiskPath,
     pub written: [DiskPath; 2],
     /// Where meshes on their way go, when they are kept.
@@ -36,7 +36,7 @@ pub struct CutJob<'a> {
 
 /// A child as its file holds it.
 struct Child {
-    mesh: PartMesh,
+    mesh: SubtreeMesh,
     /// Interface faces it took over from its parent.
     inherited: Vec<InheritedFace>,
 }
@@ -44,7 +44,7 @@ struct Child {
 impl CutJob<'_> {
     /// Does the whole job; a failed page access ends here.
     pub fn run(self, watch: &Watcher) -> Result<(CutReceipt, CutReport), PipelineError> {
-        let place = (&self.base, self.order.parent.part.first);
+        let place = (&self.base, self.order.parent.ranks.first);
         let divide = || panic_is_damage_of(place, || self.open(), || self.divide(watch));
         let divided = attempt(divide)??;
         // Empty by now; thousands of cuts would leave as many folders.
@@ -55,14 +55,14 @@ impl CutJob<'_> {
     fn divide(&self, watch: &Watcher) -> Result<(CutReceipt, CutReport), PipelineError> {
         let clock = Instant::now();
         let (parent, common) = (self.order.parent, self.common);
-        let part = parent.part;
+        let ranks = parent.ranks;
         let space = Workspace { dir: &self.scratch, memory: self.share.buffers / 2 };
         let mut host = self.open()?;
         let mut core =
-            Mesh::new(Pager::new(self.share.frames / 4, Some(self.backing(part.first, None, 4))));
+            Mesh::new(Pager::new(self.share.frames / 4, Some(self.backing(ranks.first, None, 4))));
         let plan = CutPlan {
-            cut: part.cut(),
-            low: part.low_share(),
+            cut: ranks.cut(),
+            low: ranks.low_share(),
             method: common.method,
             earlier: &self.zones,
             h: &|p| common.field.h(p),
@@ -73,7 +73,7 @@ impl CutJob<'_> {
             watch(Event { stage, done, total: None, unit: "vertices" });
         };
         let kept = common.keeps_stages.then(|| StageFiles {
-            cut: part.cut(),
+            cut: ranks.cut(),
             output: self.output,
             scratch: &self.scratch,
             memory: self.share.buffers,
@@ -90,10 +90,10 @@ impl CutJob<'_> {
         let faces = kept.as_ref().map(|_| &mut stages.faces);
         let opened = bisect::choose(&mut host, &mut core, &plan, refined, faces, &progress);
         let mut pages = PagerStats::default();
-        let [low, high] = part.children();
-        let mut child = |part, path| {
+        let [low, high] = ranks.children();
+        let mut child = |ranks, path| {
             let (child, stats) =
-                self.child((&mut host, &mut core), &opened, (part, path), &space)?;
+                self.child((&mut host, &mut core), &opened, (ranks, path), &space)?;
             pages.add(stats);
             Ok::<_, PipelineError>(child)
         };
@@ -101,8 +101,8 @@ impl CutJob<'_> {
         let high = child(high, &self.written[1])?;
         pages.add(host.pages().stats());
         let journal = CutJournal {
-            cut: part.cut(),
-            subdomain: part.first,
+            cut: ranks.cut(),
+            subdomain: ranks.first,
             report: &opened.report,
             pages,
             frames_used: host.pages().frames_used() + core.pages().frames_used(),
@@ -116,28 +116,28 @@ impl CutJob<'_> {
             stages: stages.rows(&opened.zone),
             stage_faces: stages.face_bytes(),
             journal: journal.row(clock),
-            traffic: Traffic::new(pages, journal.frames_used),
+            traffic: traffic_of(pages, journal.frames_used),
         };
         Ok((receipt, opened.report))
     }
 
-    /// The part's mesh as its file holds it.
+    /// The mesh of the subtree as its file holds it.
     fn open(&self) -> Result<Mesh, PipelineError> {
         let parent = self.order.parent;
-        let backing = self.backing(parent.part.first, None, 2);
-        open_part(parent, self.base.clone(), backing, self.share.frames / 2)
+        let backing = self.backing(parent.ranks.first, None, 2);
+        open_subtree(parent, self.base.clone(), backing, self.share.frames / 2)
     }
 
     fn child(
         &self,
         (host, core): (&mut Mesh, &mut Mesh),
         opened: &OpenCut,
-        (part, path): (TreePart, &DiskPath),
+        (ranks, path): (RankRange, &DiskPath),
         space: &Workspace,
     ) -> Result<(Child, PagerStats), PipelineError> {
-        let backing = self.backing(part.first, Some(path.clone()), 2);
+        let backing = self.backing(ranks.first, Some(path.clone()), 2);
         let mut mesh = Mesh::new(Pager::new(self.share.frames / 4, Some(backing)));
-        let high = part.first == opened.zone.cut;
+        let high = ranks.first == opened.zone.cut;
         let bounds = &self.common.bounds;
         bisect::write_child(host, core, &mut mesh, opened, high, bounds, space)?;
         let mut inherited = Vec::new();
@@ -154,15 +154,15 @@ impl CutJob<'_> {
         }
         let [below, all] = opened.report.plane.load;
         let load = if high { all - below } else { below };
-        let part_mesh = PartMesh {
-            part,
+        let child_mesh = SubtreeMesh {
+            ranks,
             generation: self.order.parent.generation + DONE,
             state: mesh.state(),
             extents: mesh.pages().extents(),
             load,
         };
         let stats = mesh.into_pages().finish();
-        let child = Child { mesh: part_mesh, inherited };
+        let child = Child { mesh: child_mesh, inherited };
         Ok((child, stats))
     }
 

@@ -1,4 +1,4 @@
-//! What the journal keeps of a cut.
+//! The row of the journal for a cut.
 
 use std::time::Instant;
 

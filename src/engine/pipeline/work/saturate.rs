@@ -12,14 +12,14 @@ use tetdb_kernel::optimize::{self, OptimizeReport};
 use tetdb_kernel::refine::{Everywhere, Field, PlacementRule, RefineReport, saturate};
 use tetdb_kernel::sizing::SizeField;
 
-/// What the fine step did.
+/// Report of the fine step.
 #[derive(Clone, Debug)]
 pub struct FineReport {
-    /// What the division of edges did.
+    /// Report of the division of edges.
     pub refine: RefineReport,
-    /// What the optimization did.
+    /// Report of the optimization.
     pub optimize: OptimizeReport,
-    /// What refinement and optimization took.
+    /// Seconds that refinement and optimization took.
     pub seconds: [f64; 2],
 }
 

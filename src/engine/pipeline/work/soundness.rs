@@ -7,8 +7,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::{DiskPath, Pages, StorageError, attempt};
 use tetdb_kernel::mesh::{FaceRef, Mesh};
-use tetdb_kernel::topology::OppositeOwners;
 use tetdb_schema::page::{RECORDS, SLOT_MASK};
+use tetdb_schema::topology::FacesAcross;
 use tetdb_store::sealed::SealedError;
 
 /// Does `work`. Errors: its own; damage, when it panics and what `open` opens, which it began with, is no mesh. Other panics are bugs and
@@ -43,7 +43,7 @@ fn damaged((base, part): (&DiskPath, u32), what: &str) -> PipelineError {
 /// Looks at the mesh of a part before work begins. Errors: damage, a face between sub-domains that nobody has beyond.
 pub fn check_owners<P: Pages>(
     mesh: &mut Mesh<P>,
-    owners: &BTreeMap<u32, OppositeOwners>,
+    owners: &BTreeMap<u32, FacesAcross>,
     place: (&DiskPath, u32),
 ) -> Result<(), PipelineError> {
     let all = (0..mesh.n_interface_faces()).map(|n| mesh.interface_face(n));

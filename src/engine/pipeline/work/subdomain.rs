@@ -7,28 +7,31 @@ use tetdb_schema::ids::SubdomainId;
 
 use super::coarse_snapshot::save;
 use super::common::Common;
-use super::receipt::{SubdomainReceipt, Traffic};
 use super::saturate::{FineReport, saturate_and_optimize};
 use super::soundness::panic_is_damage_of;
+use super::traffic::traffic_of;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::compact::seal;
 use crate::pipeline::seal::target::SealTarget;
-use crate::pipeline::seal::totals::{SealedTotals, journal};
-use crate::pipeline::tree::{PartMesh, open_part};
+use crate::pipeline::seal::totals::{journal, totals_of};
+use crate::pipeline::tree::open_subtree;
 use tetdb_base::storage::{Backing, DiskPath, PagerStats, attempt};
 use tetdb_kernel::bisect::Zone;
 use tetdb_kernel::mesh::{Mesh, Workspace};
 use tetdb_kernel::sizing::{SizeField, TETS_PER_LOAD};
-use tetdb_kernel::topology::OppositeOwners;
+use tetdb_schema::blob::BlobContent;
 use tetdb_schema::catalog::{CoarseRow, StoreState};
+use tetdb_schema::topology::FacesAcross;
+use tetdb_schema::tree::SubtreeMesh;
+use tetdb_schema::work::SubdomainReceipt;
 use tetdb_store::sealed::{Form, Sealed};
 
-/// What a worker needs to make a sub-domain.
+/// The meshing of one sub-domain.
 pub struct SubdomainJob {
-    pub part: PartMesh,
-    /// The part's file, the file to make.
+    pub mesh: SubtreeMesh,
+    /// The file of its coarse mesh, and the file to write.
     pub base: DiskPath,
     pub sealed: DiskPath,
     pub form: Form,
@@ -40,14 +43,14 @@ pub struct SubdomainJob {
     pub kept: Option<DiskPath>,
     pub scratch: DiskPath,
     pub zones: Vec<Zone>,
-    /// Who has the other side of the faces around it, by cut.
-    pub owners: BTreeMap<u32, OppositeOwners>,
+    /// Owners of the other side of the faces around it, by cut.
+    pub owners: BTreeMap<u32, FacesAcross>,
     pub share: Plan,
 }
 
 /// A finished sub-domain; its file is not yet listed.
 pub struct FinishedSubdomain {
-    pub part: PartMesh,
+    pub mesh: SubtreeMesh,
     pub sealed: Sealed,
     pub kept: Option<CoarseRow>,
     /// Seconds it took to keep the coarse snapshot.
@@ -62,21 +65,21 @@ pub struct FinishedSubdomain {
 impl SubdomainJob {
     /// Does the whole job; a failed page access ends here.
     pub fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
-        let (part, base) = (self.part, self.base.clone());
+        let (subtree, base) = (self.mesh, self.base.clone());
         let (generation, scratch, share) = (self.generation, self.scratch.clone(), self.share);
         let open = || {
             let backing = Backing {
-                subdomain: part.part.first,
+                subdomain: subtree.ranks.first,
                 generation,
                 spill: scratch.clone(),
                 output: None,
                 base: None,
                 cache_bytes: share.redb as usize,
             };
-            open_part(part, base.clone(), backing, share.frames)
+            open_subtree(subtree, base.clone(), backing, share.frames)
         };
         attempt(|| {
-            panic_is_damage_of((&base, part.part.first), open, || {
+            panic_is_damage_of((&base, subtree.ranks.first), open, || {
                 self.finish(open()?, common, watch)
             })
         })?
@@ -91,7 +94,7 @@ impl SubdomainJob {
     ) -> Result<FinishedSubdomain, PipelineError> {
         let clock = Instant::now();
         let space = Workspace { dir: &self.scratch, memory: self.share.buffers / 2 };
-        let (rank, coarse) = (self.part.part.first, self.part.generation);
+        let (rank, coarse) = (self.mesh.ranks.first, self.mesh.generation);
         let kept = match &self.kept {
             Some(path) => Some(save(&mut mesh, path, rank, coarse, self.share.buffers)?),
             None => None,
@@ -124,7 +127,7 @@ impl SubdomainJob {
         drop(pager);
         let _ = self.scratch.remove_dir_all();
         Ok(FinishedSubdomain {
-            part: self.part,
+            mesh: self.mesh,
             sealed,
             kept,
             keep_s,
@@ -142,8 +145,8 @@ impl FinishedSubdomain {
     pub fn receipt(&self) -> SubdomainReceipt {
         let refine = &self.fine.refine;
         let measures = [
-            ("predicted_tets", TETS_PER_LOAD * self.part.load),
-            ("coarse_tets", f64::from(self.part.state.n_tets())),
+            ("predicted_tets", TETS_PER_LOAD * self.mesh.load),
+            ("coarse_tets", f64::from(self.mesh.state.n_tets())),
             ("keep_s", self.keep_s),
             ("inserted_vertices", refine.inserted as f64),
             ("over_constrained_tets", refine.over_constrained as f64),
@@ -158,14 +161,14 @@ impl FinishedSubdomain {
         ];
         let step = "saturate, optimize, seal";
         let mut journal = journal(StoreState::Bisected, step, self.clock, &measures);
-        journal.subdomain = Some(self.part.part.first);
+        journal.subdomain = Some(self.mesh.ranks.first);
         SubdomainReceipt {
-            coarse: self.part.generation,
+            coarse: self.mesh.generation,
             row: self.sealed.row.clone(),
             kept: self.kept,
-            totals: SealedTotals::of(&self.sealed).to_bytes(),
+            totals: totals_of(&self.sealed).to_bytes(),
             journal,
-            traffic: Traffic::new(self.pages, self.frames_used),
+            traffic: traffic_of(self.pages, self.frames_used),
         }
     }
 }

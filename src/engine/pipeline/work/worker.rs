@@ -1,11 +1,9 @@
-//! Who does orders: the same for every carrier.
+//! The worker: it performs orders, whoever carries them.
 
 use std::collections::BTreeMap;
 
 use super::common::Common;
 use super::cut::CutJob;
-use super::order::{CutOrder, Order, SubdomainOrder};
-use super::receipt::{CutReceipt, Receipt};
 use super::subdomain::SubdomainJob;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Plan;
@@ -13,6 +11,7 @@ use crate::pipeline::progress::Watcher;
 use crate::pipeline::tree::DONE;
 use tetdb_base::storage::DiskPath;
 use tetdb_kernel::bisect::CutReport;
+use tetdb_schema::work::{CutOrder, CutReceipt, Receipt, SubdomainOrder, WorkOrder};
 use tetdb_store::store::{Catalog, StoreError};
 
 /// Where a worker finds files and leaves new ones.
@@ -59,13 +58,13 @@ impl Worker<'_> {
     /// Does one order, with the memory of `share`.
     pub fn perform(
         &self,
-        order: Order,
+        order: WorkOrder,
         share: Plan,
         watch: &Watcher,
     ) -> Result<Receipt, PipelineError> {
         match order {
-            Order::Cut(order) => Ok(Receipt::Cut(self.cut(&order, share, watch)?.0)),
-            Order::Subdomain(order) => {
+            WorkOrder::Cut(order) => Ok(Receipt::Cut(self.cut(&order, share, watch)?.0)),
+            WorkOrder::Subdomain(order) => {
                 let job = self.subdomain_job(order, share)?;
                 let finished = job.run(self.common, watch)?;
                 Ok(Receipt::Subdomain(finished.receipt()))
@@ -80,12 +79,12 @@ impl Worker<'_> {
         share: Plan,
         watch: &Watcher,
     ) -> Result<(CutReceipt, CutReport), PipelineError> {
-        let (parent, cut) = (order.parent, order.parent.part.cut());
-        let written = (parent.part.children()).map(|part| {
+        let (parent, cut) = (order.parent, order.parent.ranks.cut());
+        let written = (parent.ranks.children()).map(|part| {
             let name = Catalog::file_name(part.first, parent.generation + DONE);
             self.place.output.join(name)
         });
-        let base = Catalog::file_name(parent.part.first, parent.generation);
+        let base = Catalog::file_name(parent.ranks.first, parent.generation);
         let job = CutJob {
             order,
             base: self.place.input(base),
@@ -99,18 +98,18 @@ impl Worker<'_> {
         job.run(watch)
     }
 
-    /// What a sub-domain takes.
+    /// The meshing of a sub-domain, ready to run.
     pub fn subdomain_job(
         &self,
         order: SubdomainOrder,
         share: Plan,
     ) -> Result<SubdomainJob, PipelineError> {
-        let SubdomainOrder { part, zones, owners } = order;
-        let (rank, coarse) = (part.part.first, part.generation);
+        let SubdomainOrder { mesh, zones, owners } = order;
+        let (rank, coarse) = (mesh.ranks.first, mesh.generation);
         let output = |name: String| self.place.output.join(name);
         let kept = Catalog::coarse_name(rank, coarse);
         Ok(SubdomainJob {
-            part,
+            mesh,
             base: self.place.input(Catalog::file_name(rank, coarse)),
             sealed: output(Catalog::file_name(rank, coarse + DONE)),
             generation: coarse + DONE,

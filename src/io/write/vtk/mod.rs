@@ -91,10 +91,11 @@ pub(super) fn write(
         return Ok(());
     };
     let done = write_own(mesh, &path);
-    writers.say(done.as_ref().copied().map_err(|error| RemoteFailure {
-        code: error.code(),
-        message: error.to_string(),
-    }));
+    writers.say(
+        done.as_ref()
+            .copied()
+            .map_err(|error| RemoteFailure { code: error.code(), message: error.to_string() }),
+    );
     done
 }
 

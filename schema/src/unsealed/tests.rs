@@ -9,7 +9,7 @@ const RANK: u32 = 3;
 const GENERATION: u32 = 9;
 
 /// Through pages and back.
-fn through<R: PageRecord>(records: &[R], working: impl Fn(R) -> Working) -> Vec<R> {
+fn through<R: PageRecord>(records: &[R], working: impl Fn(R) -> WorkingWords) -> Vec<R> {
     let mut packer = PagePacker::new(RANK, GENERATION);
     let mut values = std::collections::BTreeMap::new();
     for &record in records {
@@ -26,12 +26,12 @@ fn through<R: PageRecord>(records: &[R], working: impl Fn(R) -> Working) -> Vec<
     let mut later = PageDecoder::new(RANK, GENERATION + 1);
     let (mut all, mut page_records) = (Vec::new(), Vec::new());
     for page in 0..packer.pages() {
-        let (main, beside) = PageDecoder::keys::<R>(page);
+        let (main, extra) = PageDecoder::keys::<R>(page);
         decoder.open::<R>(page, &values[&main]).expect("as it was written");
         assert!(matches!(elsewhere.open::<R>(page, &values[&main]), Err(PageError::Header { .. })));
         assert!(matches!(later.open::<R>(page, &values[&main]), Err(PageError::Header { .. })));
-        if let Some(beside) = beside {
-            decoder.open_beside::<R>(page, &values[&beside]).expect("as it was written");
+        if let Some(extra) = extra {
+            decoder.open_extra::<R>(page, &values[&extra]).expect("as it was written");
         }
         let first = decoder.records(page, &mut page_records).expect("all are records");
         assert_eq!(first as usize, all.len());
@@ -45,7 +45,7 @@ fn records_come_back_from_their_pages() {
     let tets: Vec<SealedTet> = (0..10_000u32)
         .map(|i| SealedTet { nodes: [i, i + 1, 7 * i, 100_000 - i], region: i % 3 })
         .collect();
-    let place = TetPlace { neighbors: [NONE, 17, 4 * 5000 + 3, 8], required: 0b1001, flags: 1 };
+    let place = TetLinks { neighbors: [NONE, 17, 4 * 5000 + 3, 8], required: 0b1001, flags: 1 };
     assert_eq!(through(&tets, |t| t.to_working(&place)), tets);
 
     let own = SubdomainId::new(RANK).expect("a small rank");
@@ -94,14 +94,14 @@ fn records_come_back_from_their_pages() {
 #[test]
 fn a_slot_without_a_tetrahedron_is_damage() {
     let tet = SealedTet { nodes: [0, 1, 2, 3], region: 1 };
-    let place = TetPlace { neighbors: [NONE; 4], required: 0, flags: 0 };
+    let place = TetLinks { neighbors: [NONE; 4], required: 0, flags: 0 };
     let mut packer = PagePacker::new(RANK, GENERATION);
     packer.push(tet, tet.to_working(&place));
     let set = packer.cut().expect("one record");
     let mut decoder = PageDecoder::new(RANK, GENERATION);
     let open = decoder.open::<SealedTet>(0, &set.values[0].1);
-    let beside = decoder.open_beside::<SealedTet>(0, &set.values[1].1);
-    assert_eq!((open, beside), (Ok(()), Ok(())));
+    let extra = decoder.open_extra::<SealedTet>(0, &set.values[1].1);
+    assert_eq!((open, extra), (Ok(()), Ok(())));
     let mut records = Vec::<SealedTet>::new();
     assert_eq!(decoder.records(0, &mut records), Ok(0));
     assert_eq!(records, [tet]);
@@ -113,13 +113,5 @@ fn a_slot_without_a_tetrahedron_is_damage() {
         let open = decoder.open::<SealedTet>(0, stored_bytes(&frame));
         assert_eq!(open, Ok(()));
         assert!(decoder.records(0, &mut records).is_err(), "{count}");
-    }
-}
-
-#[test]
-fn numbers_and_ids_are_the_same_thing() {
-    for n in [0, 1, 2045, 2046, 4091, 4092, 100_000] {
-        assert_eq!(dense(sparse(n)), n);
-        assert!((sparse(n) & SLOT_MASK) < RECORDS as u32);
     }
 }

@@ -1,47 +1,55 @@
-//! Orders and receipts as bytes: a head with version and checksum, then the archived record.
+//! Work done elsewhere: orders and receipts, as files of the folder `work` and as messages between processes.
 //!
-//! | bytes | what |
+//! None of it is part of a finished store, and it has a version of its own. Bytes of a file or message:
+//!
+//! | bytes | content |
 //! |---|---|
 //! | 0..8 | `TETDBWRK` |
 //! | 8..10 | version |
-//! | 10..12 | what it is, see [`Kind`] |
+//! | 10..12 | [`WorkKind`] |
 //! | 12..16 | zero |
 //! | 16..24 | xxh3 of the rest, seeded with the xxh3 of bytes 0..16 |
+//! | 24.. | an archived record, or the bytes of a size field |
 
-use rkyv::api::high::{HighDeserializer, HighSerializer, HighValidator};
-use rkyv::bytecheck::CheckBytes;
-use rkyv::rancor::Error;
-use rkyv::ser::allocator::ArenaHandle;
-use rkyv::util::AlignedVec;
-use rkyv::{Archive, Deserialize, Serialize};
+mod order;
+mod receipt;
+mod task;
+
+pub use order::{CutOrder, SubdomainOrder, WorkOrder};
+pub use receipt::{CutReceipt, InheritedFace, Receipt, SubdomainReceipt, Traffic};
+pub use task::{PlanRecord, RunRecord, TaskMark, TaskOrders, TaskReceipts};
+
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
+
+use crate::archive::{Archivable, from_archive, to_archive};
 
 const MAGIC: &[u8; 8] = b"TETDBWRK";
 /// Raised whenever the layout of any record changes.
 const VERSION: u16 = 1;
 const HEAD: usize = 24;
 
-/// What the bytes hold.
+/// The content behind a head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// The plan of all tasks.
+#[non_exhaustive]
+pub enum WorkKind {
+    /// [`PlanRecord`] in a file, [`RunRecord`] in a message.
     Plan = 1,
-    /// Orders of one task.
+    /// [`TaskOrders`] in a file, [`WorkOrder`] in a message.
     Orders = 2,
-    /// Receipts of one task.
+    /// [`TaskReceipts`] in a file, [`Receipt`] in a message.
     Receipts = 3,
-    /// A size field.
+    /// The size field, as [`Blob::SizeField`](crate::blob::Blob::SizeField) has it.
     SizeField = 4,
-    /// What is the same for all sub-domains of a verification.
+    /// Parameters common to all sub-domains of a verification; a message.
     Verification = 5,
-    /// The row of a sub-domain to be verified.
+    /// The row of a sub-domain to be verified; a message.
     PartOrder = 6,
-    /// What was found of a sub-domain.
+    /// The findings in a sub-domain; a message.
     PartReport = 7,
 }
 
-/// What stands before a body.
-pub fn head(kind: Kind, body: &[u8]) -> Vec<u8> {
+/// The head of a body.
+pub fn head(kind: WorkKind, body: &[u8]) -> Vec<u8> {
     let mut head = MAGIC.to_vec();
     head.extend(VERSION.to_le_bytes());
     head.extend((kind as u16).to_le_bytes());
@@ -51,19 +59,16 @@ pub fn head(kind: Kind, body: &[u8]) -> Vec<u8> {
     head
 }
 
-/// Archives a record.
-pub fn to_bytes<T>(kind: Kind, record: &T) -> Vec<u8>
-where
-    T: for<'a> Serialize<HighSerializer<AlignedVec, ArenaHandle<'a>, Error>>,
-{
-    let body = rkyv::to_bytes::<Error>(record).expect("memory is the only resource this takes");
+/// A head and an archived record.
+pub fn to_bytes(kind: WorkKind, record: &impl Archivable) -> Vec<u8> {
+    let body = to_archive(record);
     let mut bytes = head(kind, &body);
     bytes.extend_from_slice(&body);
     bytes
 }
 
-/// The body behind its head. Errors: in words what is wrong with the bytes.
-pub fn body(kind: Kind, bytes: &[u8]) -> Result<&[u8], String> {
+/// The body behind its head. Errors: the reason in words.
+pub fn body(kind: WorkKind, bytes: &[u8]) -> Result<&[u8], String> {
     let Some((head, body)) = bytes.split_first_chunk::<HEAD>() else {
         return Err(format!("it has only {} bytes", bytes.len()));
     };
@@ -85,17 +90,9 @@ pub fn body(kind: Kind, bytes: &[u8]) -> Result<&[u8], String> {
     }
 }
 
-/// Checks and opens a record. Errors: in words what is wrong with the bytes.
-pub fn from_bytes<T>(kind: Kind, bytes: &[u8]) -> Result<T, String>
-where
-    T: Archive,
-    T::Archived:
-        for<'a> CheckBytes<HighValidator<'a, Error>> + Deserialize<T, HighDeserializer<Error>>,
-{
-    let body = body(kind, bytes)?;
-    let mut aligned = AlignedVec::<16>::with_capacity(body.len());
-    aligned.extend_from_slice(body);
-    rkyv::from_bytes::<T, Error>(&aligned).map_err(|e| format!("it cannot be opened: {e}"))
+/// Checks and opens a record. Errors: the reason in words.
+pub fn from_bytes<T: Archivable>(kind: WorkKind, bytes: &[u8]) -> Result<T, String> {
+    from_archive(body(kind, bytes)?).map_err(|reason| format!("it {reason}"))
 }
 
 #[cfg(test)]
@@ -105,8 +102,8 @@ mod tests {
     #[test]
     fn every_changed_or_missing_byte_is_noticed() {
         let record: Vec<u32> = (0..9).collect();
-        let bytes = to_bytes(Kind::Orders, &record);
-        let read = |bytes: &[u8]| from_bytes::<Vec<u32>>(Kind::Orders, bytes);
+        let bytes = to_bytes(WorkKind::Orders, &record);
+        let read = |bytes: &[u8]| from_bytes::<Vec<u32>>(WorkKind::Orders, bytes);
         assert_eq!(read(&bytes), Ok(record));
         for at in 0..bytes.len() {
             let mut damaged = bytes.clone();
@@ -114,6 +111,6 @@ mod tests {
             assert!(read(&damaged).is_err(), "byte {at}");
             assert!(read(&bytes[..at]).is_err(), "cut to {at} bytes");
         }
-        assert!(from_bytes::<Vec<u32>>(Kind::Receipts, &bytes).is_err());
+        assert!(from_bytes::<Vec<u32>>(WorkKind::Receipts, &bytes).is_err());
     }
 }

@@ -1,12 +1,12 @@
 //! Fills pages with a stream of records.
 
-use super::{BESIDE, PageRecord, Working};
+use super::{EXTRA_PER_SLOT, PageRecord, WorkingWords};
 use crate::page::{
     NONE, PageAddress, PageKind, RECORDS, SLOTS, Slot, page_key, seal_full_page, stored_bytes,
     u32_le,
 };
 
-/// A page of records ready to be stored, with whatever else is full by now.
+/// A page of records ready to be stored, and the page of extra words if that is full too.
 pub struct PageSet<R> {
     /// Number of the page.
     pub page: u32,
@@ -14,7 +14,7 @@ pub struct PageSet<R> {
     pub first: u32,
     /// Its records, in order.
     pub records: Vec<R>,
-    /// Keys and values: the page, and the page of second words when it is full.
+    /// Keys and values of these pages.
     pub values: Vec<(u64, Vec<u8>)>,
 }
 
@@ -26,8 +26,8 @@ pub struct PagePacker<R> {
     first: u32,
     pending: Vec<R>,
     slots: Vec<Slot>,
-    beside: Vec<[u32; 2]>,
-    beside_pages: u32,
+    extra: Vec<[u32; 2]>,
+    extra_pages: u32,
 }
 
 impl<R: PageRecord> PagePacker<R> {
@@ -39,8 +39,8 @@ impl<R: PageRecord> PagePacker<R> {
             first: 0,
             pending: Vec::new(),
             slots: Vec::new(),
-            beside: Vec::new(),
-            beside_pages: 0,
+            extra: Vec::new(),
+            extra_pages: 0,
         }
     }
 
@@ -54,31 +54,31 @@ impl<R: PageRecord> PagePacker<R> {
         self.first.div_ceil(RECORDS as u32)
     }
 
-    /// Takes a record and what it becomes; returns a page when one is full.
-    pub fn push(&mut self, record: R, working: Working) -> Option<PageSet<R>> {
+    /// Takes a record and its words; returns a page when one is full.
+    pub fn push(&mut self, record: R, working: WorkingWords) -> Option<PageSet<R>> {
         self.pending.push(record);
         self.slots.push(working.slot);
-        if R::BESIDE.is_some() {
-            self.beside.push(working.beside);
+        if R::EXTRA.is_some() {
+            self.extra.push(working.extra);
         }
         (self.pending.len() == RECORDS).then(|| self.page(false))
     }
 
-    /// What is left as the last page; `None` when nothing is.
+    /// The last page; `None` when no record is left.
     pub fn cut(&mut self) -> Option<PageSet<R>> {
         (!self.pending.is_empty()).then(|| self.page(true))
     }
 
     fn page(&mut self, last: bool) -> PageSet<R> {
         let page = self.first / RECORDS as u32;
-        // A slot without a tetrahedron says so; of the others only the count tells.
+        // A free slot of tetrahedra is marked; among other records only the count ends them.
         let empty = [u32_le::from_native(if R::PAGE == PageKind::Tets { NONE } else { 0 }); 8];
         let mut values = vec![self.sealed(R::PAGE, page, &self.slots, empty)];
         self.slots.clear();
-        if let Some(kind) = R::BESIDE
-            && (self.beside.len() == BESIDE * RECORDS || last)
+        if let Some(kind) = R::EXTRA
+            && (self.extra.len() == EXTRA_PER_SLOT * RECORDS || last)
         {
-            let slots: Vec<Slot> = (self.beside.chunks(BESIDE))
+            let slots: Vec<Slot> = (self.extra.chunks(EXTRA_PER_SLOT))
                 .map(|four| {
                     std::array::from_fn(|i| {
                         u32_le::from_native(four.get(i / 2).map_or(0, |two| two[i % 2]))
@@ -86,9 +86,9 @@ impl<R: PageRecord> PagePacker<R> {
                 })
                 .collect();
             let zero = [u32_le::from_native(0); 8];
-            values.push(self.sealed(kind, self.beside_pages, &slots, zero));
-            self.beside.clear();
-            self.beside_pages += 1;
+            values.push(self.sealed(kind, self.extra_pages, &slots, zero));
+            self.extra.clear();
+            self.extra_pages += 1;
         }
         let records = std::mem::take(&mut self.pending);
         let first = self.first;

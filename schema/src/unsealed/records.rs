@@ -1,19 +1,21 @@
 //! Records of a finished sub-domain as slots of working pages.
 
-use super::{dense, sparse};
 use crate::chunk::ChunkRecord;
 use crate::ids::{Owner, SubdomainId, VertexId};
-use crate::page::{NONE, PageKind, Slot, u32_le};
-use crate::record::{Facet, InterfaceFace, SealedFacet, SealedTet, SealedVertex, Tet, Vertex, tag};
+use crate::page::{NONE, PageKind, Slot, dense, sparse, u32_le};
+use crate::record::{
+    InterfaceFace, SealedFacet, SealedTet, SealedVertex, WorkingFacet, WorkingTet, WorkingVertex,
+    tag,
+};
 
 const VERTEX_MASK: u32 = (1 << 30) - 1;
 const REQUIRED: u32 = 1 << 31;
 const FIXED: u32 = 1 << 31;
 const TAG_BITS: u32 = 3;
 
-/// What a working tetrahedron has beside its nodes and its region.
+/// The links and flags of a working tetrahedron, which a sealed one lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TetPlace {
+pub struct TetLinks {
     /// For each face the one on its other side, as 4 · tetrahedron + face with the tetrahedron's number, or [`NONE`].
     pub neighbors: [u32; 4],
     /// Bit i: face i is required.
@@ -22,29 +24,29 @@ pub struct TetPlace {
     pub flags: u32,
 }
 
-/// What a record becomes: a slot, and two words that stand beside it.
+/// A record as words of working pages.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Working {
+pub struct WorkingWords {
     /// The slot of the main page.
     pub slot: Slot,
-    /// Its words in the page of second words.
-    pub beside: [u32; 2],
+    /// Its words in the page of extra words.
+    pub extra: [u32; 2],
 }
 
 /// A record that can be kept in working pages.
 pub trait PageRecord: ChunkRecord {
     /// The kind of its pages.
     const PAGE: PageKind;
-    /// The kind of the pages of its two other words, if it has any.
-    const BESIDE: Option<PageKind>;
+    /// The kind of the pages with its extra words, if it has any.
+    const EXTRA: Option<PageKind>;
 
-    /// What number `n` of sub-domain `rank` is; `None` for what no writer writes.
-    fn from_working(working: &Working, rank: u32, n: u32) -> Option<Self>;
+    /// Record `n` of sub-domain `rank`; `None` for words that no writer writes.
+    fn from_working(working: &WorkingWords, rank: u32, n: u32) -> Option<Self>;
 }
 
 impl SealedTet {
     /// As a working tetrahedron.
-    pub fn to_working(self, place: &TetPlace) -> Working {
+    pub fn to_working(self, place: &TetLinks) -> WorkingWords {
         let required = |i: usize| {
             if place.required >> i & 1 == 1 { REQUIRED } else { 0 }
         };
@@ -53,26 +55,29 @@ impl SealedTet {
             face => sparse(face >> 2) << 2 | face & 3,
         });
         let node = std::array::from_fn(|i| sparse(self.nodes[i]) | required(i));
-        Working { slot: Tet { node, neighbor }.to_slot(), beside: [self.region, place.flags] }
+        WorkingWords {
+            slot: WorkingTet { node, neighbor }.to_slot(),
+            extra: [self.region, place.flags],
+        }
     }
 }
 
 impl PageRecord for SealedTet {
     const PAGE: PageKind = PageKind::Tets;
-    const BESIDE: Option<PageKind> = Some(PageKind::TetAttributes);
+    const EXTRA: Option<PageKind> = Some(PageKind::TetAttributes);
 
-    fn from_working(working: &Working, _rank: u32, _n: u32) -> Option<Self> {
-        let tet = Tet::from_slot(&working.slot);
+    fn from_working(working: &WorkingWords, _rank: u32, _n: u32) -> Option<Self> {
+        let tet = WorkingTet::from_slot(&working.slot);
         (tet.node[0] != NONE).then(|| Self {
             nodes: tet.node.map(|node| dense(node & VERTEX_MASK)),
-            region: working.beside[0],
+            region: working.extra[0],
         })
     }
 }
 
 impl SealedVertex {
-    /// As a working vertex of sub-domain `rank`, which is nailed down unless it is the mesher's own. Its tetrahedron is not known.
-    pub fn to_working(self, rank: u32) -> Working {
+    /// As a working vertex of sub-domain `rank`: fixed unless the mesher added it, and without a tetrahedron.
+    pub fn to_working(self, rank: u32) -> WorkingWords {
         let id = VertexId::from_number(self.id);
         let (cut, index) = match id.map(|id| (id.owner, id.index)) {
             Some((Owner::Cut(cut), index)) => (cut, index),
@@ -87,19 +92,22 @@ impl SealedVertex {
             tag::FREE | tag::STEINER => 0,
             _ => FIXED,
         };
-        let vertex =
-            Vertex { point: self.point, h: f32::from_bits(self.h.to_bits() | fixed), v2t: NONE };
-        Working { slot: vertex.to_slot(), beside: [self.tag | cut << TAG_BITS, index] }
+        let vertex = WorkingVertex {
+            point: self.point,
+            h: f32::from_bits(self.h.to_bits() | fixed),
+            v2t: NONE,
+        };
+        WorkingWords { slot: vertex.to_slot(), extra: [self.tag | cut << TAG_BITS, index] }
     }
 }
 
 impl PageRecord for SealedVertex {
     const PAGE: PageKind = PageKind::Vertices;
-    const BESIDE: Option<PageKind> = Some(PageKind::VertexAttributes);
+    const EXTRA: Option<PageKind> = Some(PageKind::VertexAttributes);
 
-    fn from_working(working: &Working, rank: u32, n: u32) -> Option<Self> {
-        let vertex = Vertex::from_slot(&working.slot);
-        let [word, index] = working.beside;
+    fn from_working(working: &WorkingWords, rank: u32, n: u32) -> Option<Self> {
+        let vertex = WorkingVertex::from_slot(&working.slot);
+        let [word, index] = working.extra;
         let (tag, cut) = (word & ((1 << TAG_BITS) - 1), word >> TAG_BITS);
         let owner = match tag {
             tag::SURFACE => Owner::Surface,
@@ -130,48 +138,48 @@ fn tet_number(id: u32) -> u32 {
 
 impl SealedFacet {
     /// As a working facet.
-    pub fn to_working(self) -> Working {
-        let facet = Facet {
+    pub fn to_working(self) -> WorkingWords {
+        let facet = WorkingFacet {
             vertices: self.vertices.map(sparse),
             label: self.label,
             triangle: self.triangle,
             regions: self.regions,
         };
-        Working { slot: facet.to_slot(), beside: self.tets.map(tet_id) }
+        WorkingWords { slot: facet.to_slot(), extra: self.tets.map(tet_id) }
     }
 }
 
 impl PageRecord for SealedFacet {
     const PAGE: PageKind = PageKind::Facets;
-    const BESIDE: Option<PageKind> = Some(PageKind::FacetTets);
+    const EXTRA: Option<PageKind> = Some(PageKind::FacetTets);
 
-    fn from_working(working: &Working, _rank: u32, _n: u32) -> Option<Self> {
-        let facet = Facet::from_slot(&working.slot);
+    fn from_working(working: &WorkingWords, _rank: u32, _n: u32) -> Option<Self> {
+        let facet = WorkingFacet::from_slot(&working.slot);
         Some(Self {
             vertices: facet.vertices.map(dense),
             label: facet.label,
             triangle: facet.triangle,
             regions: facet.regions,
-            tets: working.beside.map(tet_number),
+            tets: working.extra.map(tet_number),
         })
     }
 }
 
 impl InterfaceFace {
     /// As a working interface face of sub-domain `rank`; lower ranks are on the low side of a cut.
-    pub fn to_working(self, rank: u32) -> Working {
+    pub fn to_working(self, rank: u32) -> WorkingWords {
         let [a, b, c] = self.vertices.map(sparse);
         let side = u32::from(rank > self.other);
         let words = [a, b, c, self.cut, self.index, side, self.other, tet_id(self.tet)];
-        Working { slot: words.map(u32_le::from_native), beside: [0; 2] }
+        WorkingWords { slot: words.map(u32_le::from_native), extra: [0; 2] }
     }
 }
 
 impl PageRecord for InterfaceFace {
     const PAGE: PageKind = PageKind::InterfaceFaces;
-    const BESIDE: Option<PageKind> = None;
+    const EXTRA: Option<PageKind> = None;
 
-    fn from_working(working: &Working, _rank: u32, _n: u32) -> Option<Self> {
+    fn from_working(working: &WorkingWords, _rank: u32, _n: u32) -> Option<Self> {
         let [a, b, c, cut, index, _side, other, tet] = working.slot.map(u32_le::to_native);
         Some(Self { vertices: [a, b, c].map(dense), cut, index, other, tet: tet_number(tet) })
     }

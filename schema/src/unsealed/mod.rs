@@ -1,0 +1,22 @@
+//! Finished sub-domains that were not sealed: the same records in the same order, in working pages.
+//!
+//! Record `n` is in slot `n % 2046` of page `n / 2046`. Two more words of a record stand four to a slot in pages of another kind:
+//! attributes of tetrahedra and vertices, the tetrahedra on the sides of facets.
+
+mod pack;
+mod records;
+#[cfg(test)]
+mod tests;
+mod unpack;
+
+pub use pack::{PagePacker, PageSet};
+pub use records::{PageRecord, TetLinks, WorkingWords};
+pub use unpack::PageDecoder;
+
+/// Records whose extra words share a slot.
+const EXTRA_PER_SLOT: usize = 4;
+
+/// The page with the extra words of the records in page `page`.
+pub const fn extra_page(page: u32) -> u32 {
+    page / EXTRA_PER_SLOT as u32
+}
