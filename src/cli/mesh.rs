@@ -13,7 +13,6 @@ use super::{config, export, info, memory, threads};
 use tetdb_engine::api::targets::{check_target, inputs_of};
 use tetdb_engine::api::{Existing, Mesher, Settings, resume_reported};
 use tetdb_engine::pipeline::Summary;
-use tetdb_io::write::Selection;
 
 pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     if let Some(file) = args.output.as_deref().filter(|out| export::check_format(out).is_ok()) {
@@ -156,7 +155,7 @@ pub(super) fn write_exports(
     console: &Console,
 ) -> Result<(), Failure> {
     for out in &args.export {
-        export::write(path, out, &Selection::default(), settings, console)?;
+        export::write(path, out, settings, console)?;
     }
     Ok(())
 }

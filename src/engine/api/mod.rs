@@ -6,8 +6,10 @@
 //! `error`. Private: `job` (what is put on record), `preflight` (what is refused before it begins), `replace` (one store in the place of
 //! another), `guard` (nothing unwinds into the caller).
 
+mod answer_file;
+mod answer_rows;
 mod ask;
-
+mod condition;
 mod defects;
 #[doc(hidden)]
 pub mod error;
@@ -21,11 +23,11 @@ pub mod job;
 mod located;
 mod memory;
 mod mesher;
+mod names;
 mod options;
 #[doc(hidden)]
 pub mod page;
-#[doc(hidden)]
-pub mod picture;
+mod picture;
 #[doc(hidden)]
 pub mod preflight;
 #[doc(hidden)]
@@ -34,8 +36,7 @@ pub mod remesh;
 pub mod replace;
 mod resume;
 mod settings;
-#[doc(hidden)]
-pub mod show;
+mod show;
 mod sizes;
 #[doc(hidden)]
 pub mod store;
@@ -53,7 +54,10 @@ pub mod verify;
 pub mod verify_server;
 mod verify_shared;
 
-pub use ask::{Answers, Order, Query};
+pub use answer_file::AnswerFile;
+pub use answer_rows::{AnswerColumn, AnswerRow, AnswerValue, csv_head};
+pub use ask::{Answers, ChunkCounts, Order, Query, TetId, VertexId};
+pub use condition::{Condition, ExprError, VARIABLES};
 pub use defects::DefectPlace;
 pub use error::Error;
 #[doc(hidden)]
@@ -68,18 +72,20 @@ pub use mesher::{Existing, Mesher, Prediction};
 #[doc(hidden)]
 pub use mesher::{divide, predict};
 pub use options::{Length, Optimize, Regions, Seal, Subdomains};
+pub use page::{Reported, ShownTriangles};
 pub use picture::{ColorBy, Snapped, Snapshot};
 pub use remesh::{Remesh, Remeshed};
 #[doc(hidden)]
 pub use resume::resume_reported;
 pub use settings::{Event, Settings};
-pub use show::{ExportOptions, Exported};
+pub use show::{ExportOptions, Exported, MESH_ENDINGS, MeshFormat, Share, Writers};
 pub use sizes::Sizes;
 pub use store::{Store, Summary};
 pub use surface::{CheckReport, Surface};
+pub use targets::{check_target, inputs_of};
 pub use tasks::Tasks;
+pub use tetdb_base::geom::short;
 pub use tetdb_base::storage::CancelToken;
-pub use tetdb_io::write::MeshFormat;
 pub use tetdb_kernel::sizing::SizeWarning;
 pub use tetdb_schema::code::Code;
 pub use verify::{Verification, VerifyLevel};

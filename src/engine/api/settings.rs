@@ -107,7 +107,6 @@ impl Settings {
     }
 
     /// The cap in bytes. Errors: `memory`, when it is less than any run needs; `usage`, when there is no thread.
-    #[doc(hidden)]
     pub fn cap(&self) -> Result<u64, Error> {
         if self.threads == Some(0) {
             return Err(

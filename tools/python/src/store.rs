@@ -312,7 +312,7 @@ impl Store {
     }
 
     fn report(&self, py: Python<'_>, out: PathBuf) -> PyResult<u64> {
-        self.alone(py, |store| Ok(store.report(out)?))
+        self.alone(py, |store| Ok(store.report(out)?.bytes))
     }
 
     /// Tetrahedra checked, and findings with how often each occurs.
