@@ -30,8 +30,8 @@ pub mod page;
 mod picture;
 #[doc(hidden)]
 pub mod preflight;
-#[doc(hidden)]
-pub mod remesh;
+mod remesh;
+mod remesh_sizes;
 #[doc(hidden)]
 pub mod replace;
 mod resume;
@@ -46,8 +46,8 @@ mod surface_arrays;
 mod surface_wires;
 #[doc(hidden)]
 pub mod targets;
-#[doc(hidden)]
-pub mod tasks;
+mod tasks;
+mod tasks_status;
 #[doc(hidden)]
 pub mod verify;
 #[doc(hidden)]
@@ -74,7 +74,7 @@ pub use mesher::{divide, predict};
 pub use options::{Length, Optimize, Regions, Seal, Subdomains};
 pub use page::{Reported, ShownTriangles};
 pub use picture::{ColorBy, Snapped, Snapshot};
-pub use remesh::{Remesh, Remeshed};
+pub use remesh::{Remesh, RemeshForecast, Remeshed};
 #[doc(hidden)]
 pub use resume::resume_reported;
 pub use settings::{Event, Settings};
@@ -84,6 +84,7 @@ pub use store::{Store, Summary};
 pub use surface::{CheckReport, Surface};
 pub use targets::{check_target, inputs_of};
 pub use tasks::Tasks;
+pub use tasks_status::{GatherReport, TaskReport, TaskStage, TaskStatus, task_ranges};
 pub use tetdb_base::geom::short;
 pub use tetdb_base::storage::CancelToken;
 pub use tetdb_kernel::sizing::SizeWarning;
