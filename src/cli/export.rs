@@ -44,7 +44,7 @@ fn share_of_ranks() -> Option<Share> {
 /// The ranks as writers of one file, where there are several.
 fn writers() -> Option<Box<dyn Writers>> {
     #[cfg(feature = "mpi")]
-    return super::ranks::SharedFile::new().map(|file| Box::new(file) as Box<dyn Writers>);
+    return super::ranks::writers();
     #[cfg(not(feature = "mpi"))]
     None
 }

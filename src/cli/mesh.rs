@@ -98,7 +98,7 @@ pub(super) fn begin(
     let mut settings = console.settings(cap, threads);
     #[cfg(feature = "mpi")]
     {
-        settings.hands = super::ranks::hands();
+        settings = super::ranks::share_work(settings);
     }
     Ok(settings)
 }

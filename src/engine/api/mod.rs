@@ -23,6 +23,8 @@ pub mod job;
 mod located;
 mod memory;
 mod mesher;
+#[cfg(feature = "mpi")]
+pub mod mpi;
 mod names;
 mod options;
 #[doc(hidden)]
@@ -50,8 +52,8 @@ mod tasks;
 mod tasks_status;
 #[doc(hidden)]
 pub mod verify;
-#[doc(hidden)]
-pub mod verify_server;
+#[cfg(any(test, feature = "mpi"))]
+mod verify_server;
 mod verify_shared;
 
 pub use answer_file::AnswerFile;

@@ -47,8 +47,7 @@ pub struct Settings {
     pub cancel: CancelToken,
     progress: Option<Listener>,
     /// Other processes that share the work.
-    #[doc(hidden)]
-    pub hands: Hands,
+    pub(super) hands: Hands,
 }
 
 impl fmt::Debug for Settings {
