@@ -4,11 +4,18 @@
 
 #[doc(inline)]
 pub use tetdb_engine::api::{
-    Answers, Bytes, CancelToken, CheckReport, Code, ColorBy, DefectPlace, Error, Event, Existing,
-    ExportOptions, Exported, Length, MeshFormat, Mesher, Optimize, Order, Prediction, Query,
-    Regions, Remesh, Remeshed, Seal, Settings, SizeWarning, Sizes, Snapped, Snapshot, Store,
-    Subdomains, Summary, Surface, Tasks, Verification, VerifyLevel,
+    AnswerColumn, AnswerFile, AnswerRow, AnswerValue, Answers, Bytes, CancelToken, CheckReport,
+    ChunkCounts, Code, ColorBy, Condition, DefectPlace, Error, Event, Existing, ExportOptions,
+    Exported, ExprError, GatherReport, Length, MESH_ENDINGS, MeshFormat, Mesher, Optimize, Order,
+    Prediction, Query, Regions, Remesh, RemeshForecast, Remeshed, Reported, Seal, Settings, Share,
+    ShownTriangles, SizeWarning, Sizes, Snapped, Snapshot, Store, Subdomains, Summary, Surface,
+    TaskReport, TaskStage, TaskStatus, Tasks, TetId, VARIABLES, Verification, VerifyLevel,
+    VertexId, Word, Writers, check_target, csv_head, inputs_of, short, task_ranges,
 };
+
+#[cfg(feature = "mpi")]
+#[doc(inline)]
+pub use tetdb_engine::api::mpi;
 
 #[doc(inline)]
 pub use tetdb_engine::data;

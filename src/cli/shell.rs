@@ -1,7 +1,7 @@
 //! `completions` and `man`: what shells and manual readers want to know of the command line.
 
 use std::path::Path;
-use tetdb_schema::code::Code;
+use tetdb_engine::api::Code;
 
 use clap::{Command, CommandFactory};
 

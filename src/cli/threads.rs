@@ -1,7 +1,7 @@
 //! Numbers of threads as typed.
 
 use super::failure::Failure;
-use tetdb_schema::code::Code;
+use tetdb_engine::api::Code;
 
 /// The number of threads that is asked for. Errors: none at all.
 pub(super) fn asked(option: Option<usize>) -> Result<Option<usize>, Failure> {

@@ -1,7 +1,7 @@
 //! Options that take one of a few words.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use tetdb_schema::word::Word;
+use tetdb_engine::api::Word;
 
 /// Parses a word of `T`. `helps` has a sentence for each word, or none at all.
 pub fn word_of<T>(helps: &'static [&'static str]) -> impl TypedValueParser<Value = T>

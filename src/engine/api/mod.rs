@@ -91,4 +91,5 @@ pub use tetdb_base::geom::short;
 pub use tetdb_base::storage::CancelToken;
 pub use tetdb_kernel::sizing::SizeWarning;
 pub use tetdb_schema::code::Code;
+pub use tetdb_schema::word::Word;
 pub use verify::{Verification, VerifyLevel};

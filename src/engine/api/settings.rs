@@ -43,8 +43,7 @@ type Listener = Arc<dyn Fn(&Event) + Send + Sync>;
 pub struct Settings {
     memory: Option<Bytes>,
     threads: Option<usize>,
-    #[doc(hidden)]
-    pub cancel: CancelToken,
+    pub(super) cancel: CancelToken,
     progress: Option<Listener>,
     /// Other processes that share the work.
     pub(super) hands: Hands,
@@ -86,16 +85,14 @@ impl Settings {
         self
     }
 
-    #[doc(hidden)]
-    pub fn n_threads(&self) -> usize {
+    pub(super) fn n_threads(&self) -> usize {
         self.threads.unwrap_or_else(|| {
             std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
         })
     }
 
     /// The cap in words, and where it comes from.
-    #[doc(hidden)]
-    pub fn cap_in_words(&self) -> String {
+    pub(super) fn cap_in_words(&self) -> String {
         match self.memory {
             Some(cap) => format!("{cap} (as asked for)"),
             None => {
@@ -124,31 +121,26 @@ impl Settings {
         }
     }
 
-    #[doc(hidden)]
-    pub fn budget(&self) -> Result<Budget, Error> {
+    pub(super) fn budget(&self) -> Result<Budget, Error> {
         Ok(Budget::new(self.cap()?))
     }
 
-    #[doc(hidden)]
-    pub fn say(&self, event: &Event) {
+    pub(super) fn say(&self, event: &Event) {
         if let Some(listener) = &self.progress {
             listener(event);
         }
     }
 
-    #[doc(hidden)]
-    pub fn note(&self, text: impl Into<String>) {
+    pub(super) fn note(&self, text: impl Into<String>) {
         self.say(&Event::Note(text.into()));
     }
 
-    #[doc(hidden)]
-    pub fn warn(&self, text: impl Into<String>) {
+    pub(super) fn warn(&self, text: impl Into<String>) {
         self.say(&Event::Warning(text.into()));
     }
 
     /// The pipeline's events as ours.
-    #[doc(hidden)]
-    pub fn watcher(&self) -> Box<Watcher<'_>> {
+    pub(super) fn watcher(&self) -> Box<Watcher<'_>> {
         Box::new(|event: pipeline::Event| {
             self.say(&Event::Progress {
                 stage: event.stage,
@@ -160,8 +152,7 @@ impl Settings {
     }
 
     /// Progress of something counted.
-    #[doc(hidden)]
-    pub fn count(&self, stage: &'static str, done: u64, total: u64, unit: &'static str) {
+    pub(super) fn count(&self, stage: &'static str, done: u64, total: u64, unit: &'static str) {
         let total = Some(total);
         self.say(&Event::Progress { stage, done, total, unit });
     }
