@@ -49,11 +49,11 @@ pub struct Query<'s> {
 /// Answers as they are found. After an error there are no more.
 pub struct Answers<'s> {
     context: RunContext,
-    found: Option<Found<'s>>,
+    found: Option<Hits<'s>>,
     left: usize,
 }
 
-type Found<'s> = Box<dyn Iterator<Item = Result<Hit, QueryError>> + 's>;
+type Hits<'s> = Box<dyn Iterator<Item = Result<Hit, QueryError>> + 's>;
 
 impl Store {
     /// Begins a question about tetrahedra.
@@ -209,7 +209,7 @@ impl<'s> Query<'s> {
         let (context, session) = store.context_and_session()?;
         let context = context.clone();
         let found = guarded_in(&context, || match order {
-            None => Ok(Box::new(session.select(selection)?) as Found),
+            None => Ok(Box::new(session.select(selection)?) as Hits),
             Some(order) => sorted(session, selection, order, (limit, memory)),
         })?;
         Ok(Answers { context, found: Some(found), left: limit.unwrap_or(usize::MAX) })
@@ -227,7 +227,7 @@ fn sorted<'s>(
     selection: Selection,
     (variable, order): (usize, Order),
     (limit, memory): (Option<usize>, u64),
-) -> Result<Found<'s>, Error> {
+) -> Result<Hits<'s>, Error> {
     let falls = order == Order::Falling;
     let few = limit.filter(|n| n.saturating_mul(2 * size_of::<Hit>()) as u64 <= memory);
     if let Some(n) = few

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::preflight::scratch_beside;
-use super::remesh_sizes::{Lengths, new_sizes};
+use super::remesh_sizes::{Lengths, RemeshSizes};
 use super::store::{open_finished, open_to_change};
 use super::{Error, Settings, Sizes, Store, Surface, guarded, job, verify};
 use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Values};
@@ -33,17 +33,15 @@ use tetdb_store::store::{Catalog, StoreError, WriterLock};
 pub struct Remesh {
     path: PathBuf,
     settings: Settings,
-    ranks: Ranks,
-    pub(super) sizes: Option<Sizes>,
-    pub(super) lengths: Option<Lengths>,
-    pub(super) factor: Option<f64>,
+    ranks: RemeshRanks,
+    sizes: RemeshSizes,
     repair: bool,
     verify: bool,
 }
 
 /// Sub-domains to be meshed again.
 #[derive(Clone, Debug)]
-enum Ranks {
+enum RemeshRanks {
     Listed(BTreeSet<u32>),
     /// Those whose lengths would differ.
     Changed,
@@ -123,10 +121,8 @@ impl Remesh {
         Self {
             path: path.as_ref().to_owned(),
             settings,
-            ranks: Ranks::Listed(BTreeSet::new()),
-            sizes: None,
-            lengths: None,
-            factor: None,
+            ranks: RemeshRanks::Listed(BTreeSet::new()),
+            sizes: RemeshSizes::default(),
             repair: false,
             verify: true,
         }
@@ -134,44 +130,44 @@ impl Remesh {
 
     /// Which sub-domains, by rank.
     pub fn subdomains(mut self, ranks: &[u32]) -> Self {
-        self.ranks = Ranks::Listed(ranks.iter().copied().collect());
+        self.ranks = RemeshRanks::Listed(ranks.iter().copied().collect());
         self
     }
 
     /// The sub-domains whose lengths would differ by 5 % somewhere.
     pub fn changed(mut self) -> Self {
-        self.ranks = Ranks::Changed;
+        self.ranks = RemeshRanks::Changed;
         self
     }
 
     /// With these sizes beside those on record: single lengths replace them, shapes and regions are added. Of lengths one by
     /// one they are the limits and the gradation.
     pub fn sizes(mut self, sizes: Sizes) -> Self {
-        self.sizes = Some(sizes);
+        self.sizes.sizes = Some(sizes);
         self
     }
 
     /// With one length for each tetrahedron of the sub-domains, by rank, in the order in which they are read.
     pub fn lengths_of_tets(mut self, lengths: Vec<f64>) -> Self {
-        self.lengths = Some(Lengths::Given(Values::Tets(lengths)));
+        self.sizes.lengths = Some(Lengths::Given(Values::Tets(lengths)));
         self
     }
 
     /// With one length for each vertex of the only sub-domain, in the order in which they are read.
     pub fn lengths_of_vertices(mut self, lengths: Vec<f64>) -> Self {
-        self.lengths = Some(Lengths::Given(Values::Vertices(lengths)));
+        self.sizes.lengths = Some(Lengths::Given(Values::Vertices(lengths)));
         self
     }
 
     /// With the lengths of a `.npy` file, for the tetrahedra or the vertices of the sub-domains: their number decides.
     pub fn lengths_from(mut self, file: impl AsRef<Path>) -> Self {
-        self.lengths = Some(Lengths::File(file.as_ref().to_owned()));
+        self.sizes.lengths = Some(Lengths::File(file.as_ref().to_owned()));
         self
     }
 
     /// All lengths times `factor`: 0.5 gives edges half as long.
     pub fn scaled(mut self, factor: f64) -> Self {
-        self.factor = Some(factor);
+        self.sizes.factor = Some(factor);
         self
     }
 
@@ -244,15 +240,15 @@ impl Remesh {
     fn request(&self, open: &mut Catalog) -> Result<(Options, Resaturation), Error> {
         let options = Options::from(job::options_of(&open.job()?, &self.path)?);
         let listed = match &self.ranks {
-            Ranks::Listed(ranks) => ranks.clone(),
-            Ranks::Changed => BTreeSet::new(),
+            RemeshRanks::Listed(ranks) => ranks.clone(),
+            RemeshRanks::Changed => BTreeSet::new(),
         };
-        let sizes = new_sizes(self, &listed, (open, &options), &self.settings)?;
+        let sizes = self.sizes.prepare(&listed, (open, &options), &self.settings)?;
         let ranks = match (&self.ranks, &sizes) {
-            (Ranks::Changed, Some(sizes)) => {
+            (RemeshRanks::Changed, Some(sizes)) => {
                 pipeline::changed(open, &options, sizes, &self.settings.budget()?)?
             }
-            (Ranks::Listed(ranks), _) if self.repair && ranks.is_empty() => damaged(open)?,
+            (RemeshRanks::Listed(ranks), _) if self.repair && ranks.is_empty() => damaged(open)?,
             _ => listed,
         };
         Ok((options, Resaturation { ranks, sizes, repair: self.repair }))

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::mesher::predict;
 use super::preflight::scratch_beside;
-use super::{Code, Error, Remesh, Settings, Surface, job};
+use super::{Code, Error, Settings, Sizes, Surface, job};
 use crate::pipeline::{MeshOptions, NewSizes, Options, OptionsText, SizeFile, Values};
 use tetdb_io::read::read_lengths;
 use tetdb_kernel::sizing::{Length, SizeField, SizeOptions, SizingError};
@@ -15,60 +15,72 @@ use tetdb_store::store::{Catalog, StoreError};
 
 /// Lengths one by one.
 #[derive(Clone, Debug)]
-pub(super) enum Lengths {
+pub enum Lengths {
     Given(Values),
     /// A `.npy` file.
     File(PathBuf),
 }
 
-/// The sizes of a request; `None` for those on record.
-///
-/// Errors: sizes without a meaning; files that cannot be read; a surface that is not what it was, where its edges are needed.
-pub(super) fn new_sizes(
-    request: &Remesh,
-    ranks: &BTreeSet<u32>,
-    (open, options): (&mut Catalog, &Options),
-    settings: &Settings,
-) -> Result<Option<NewSizes>, Error> {
-    let Remesh { sizes, lengths, factor, .. } = request;
-    if sizes.is_none() && lengths.is_none() && factor.is_none() {
-        return Ok(None);
-    }
-    let scale = factor.unwrap_or(1.0);
-    if !(scale.is_normal() && scale > 0.0) {
-        let message = format!("a factor of {scale} scales nothing, expected one above zero");
-        return Err(Error::new(Code::BadSize, message));
-    }
-    if sizes.as_ref().is_some_and(|sizes| sizes.field.is_some()) {
-        let message = "a background mesh of arrays is for a new mesh";
-        return Err(Error::new(Code::Usage, message)
-            .with_help("give a length for each tetrahedron or vertex instead"));
-    }
-    let given = match sizes {
-        Some(sizes) => Some((sizes.options()?, sizes.file.clone())),
-        None => None,
-    };
-    let only = given.as_ref().map(|(sizes, _)| sizes);
-    let beta = match only.filter(|sizes| sizes.hgrad.is_some()) {
-        Some(sizes) => sizes.beta(),
-        None => options.mesh.sizes.beta(),
-    };
-    let (limits, values) = match lengths {
-        None => ([0.0, f64::INFINITY], None),
-        Some(lengths) => {
-            let limits = limits(open, only.unwrap_or(&SizeOptions::default()))?;
-            (limits, Some(values(lengths, ranks, open, settings.cap()?)?))
+/// Sizes in place of those on record; by default none.
+#[derive(Clone, Debug, Default)]
+pub struct RemeshSizes {
+    /// Beside those on record.
+    pub sizes: Option<Sizes>,
+    pub lengths: Option<Lengths>,
+    /// A factor for all lengths.
+    pub factor: Option<f64>,
+}
+
+impl RemeshSizes {
+    /// The sizes for sub-domains of these ranks; `None` for the sizes on record.
+    ///
+    /// Errors: sizes without a meaning; files that cannot be read; a surface that is not what it was, where its edges are needed.
+    pub fn prepare(
+        &self,
+        ranks: &BTreeSet<u32>,
+        (open, options): (&mut Catalog, &Options),
+        settings: &Settings,
+    ) -> Result<Option<NewSizes>, Error> {
+        let Self { sizes, lengths, factor } = self;
+        if sizes.is_none() && lengths.is_none() && factor.is_none() {
+            return Ok(None);
         }
-    };
-    let (field, asked) = field(given, values.is_some(), (open, options), settings)?;
-    let mut asked = OptionsText::from_sizes(&asked.sizes, asked.size_field.as_ref());
-    if let Some(Lengths::File(file)) = lengths {
-        asked.size_field = Some(file.to_string_lossy().into_owned());
+        let scale = factor.unwrap_or(1.0);
+        if !(scale.is_normal() && scale > 0.0) {
+            let message = format!("a factor of {scale} scales nothing, expected one above zero");
+            return Err(Error::new(Code::BadSize, message));
+        }
+        if sizes.as_ref().is_some_and(|sizes| sizes.field.is_some()) {
+            let message = "a background mesh of arrays is for a new mesh";
+            return Err(Error::new(Code::Usage, message)
+                .with_help("give a length for each tetrahedron or vertex instead"));
+        }
+        let given = match sizes {
+            Some(sizes) => Some((sizes.options()?, sizes.file.clone())),
+            None => None,
+        };
+        let only = given.as_ref().map(|(sizes, _)| sizes);
+        let beta = match only.filter(|sizes| sizes.hgrad.is_some()) {
+            Some(sizes) => sizes.beta(),
+            None => options.mesh.sizes.beta(),
+        };
+        let (limits, values) = match lengths {
+            None => ([0.0, f64::INFINITY], None),
+            Some(lengths) => {
+                let limits = limits(open, only.unwrap_or(&SizeOptions::default()))?;
+                (limits, Some(values(lengths, ranks, open, settings.cap()?)?))
+            }
+        };
+        let (field, asked) = field(given, values.is_some(), (open, options), settings)?;
+        let mut asked = OptionsText::from_sizes(&asked.sizes, asked.size_field.as_ref());
+        if let Some(Lengths::File(file)) = lengths {
+            asked.size_field = Some(file.to_string_lossy().into_owned());
+        }
+        let asked = serde_json::to_value(&asked).unwrap_or_default();
+        let refine_by = factor.map(|factor| factor.to_string());
+        let asked = json!({ "options": asked, "refine_by": refine_by }).to_string();
+        Ok(Some(NewSizes { field, values, factor: scale, limits, beta, asked }))
     }
-    let asked = serde_json::to_value(&asked).unwrap_or_default();
-    let refine_by = factor.map(|factor| factor.to_string());
-    let asked = json!({ "options": asked, "refine_by": refine_by }).to_string();
-    Ok(Some(NewSizes { field, values, factor: scale, limits, beta, asked }))
 }
 
 /// The field of the given sizes beside those on record, where lengths one by one do not replace it; and the given sizes for the record.

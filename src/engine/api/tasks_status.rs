@@ -63,7 +63,7 @@ pub struct TaskReport {
     pub wall_s: Option<f64>,
 }
 
-/// What [`Tasks::gather_reported`](super::Tasks::gather_reported) did.
+/// The result of [`Tasks::gather_reported`](super::Tasks::gather_reported).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct GatherReport {
