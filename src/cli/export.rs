@@ -1,7 +1,6 @@
 //! `export`: files for other programs.
 
 use std::path::{Path, PathBuf};
-use tetdb_schema::code::Code;
 
 use serde_json::json;
 
@@ -11,10 +10,9 @@ use super::failure::Failure;
 use super::memory;
 use super::query;
 use super::query_ask::regions;
-use tetdb_engine::api::targets::{check_target, inputs_of};
-use tetdb_engine::api::{Error, Exported, Settings, show};
-use tetdb_io::write::{
-    Content, ENDINGS, ElementOrder, ExportSelection, MeshFormat, Share, Writers, check,
+use tetdb_engine::api::{
+    Code, ExportOptions, Exported, MESH_ENDINGS, MeshFormat, Settings, Share, Store, Writers,
+    check_target, inputs_of,
 };
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
@@ -46,7 +44,7 @@ fn share_of_ranks() -> Option<Share> {
 /// The ranks as writers of one file, where there are several.
 fn writers() -> Option<Box<dyn Writers>> {
     #[cfg(feature = "mpi")]
-    return super::ranks::SharedFile::new().map(|file| Box::new(file) as Box<dyn Writers>);
+    return super::ranks::writers();
     #[cfg(not(feature = "mpi"))]
     None
 }
@@ -69,47 +67,17 @@ fn write_share(
     is_first: bool,
 ) -> Result<Vec<Exported>, Failure> {
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
-    let format = match &args.format {
-        Some(word) => Some(MeshFormat::from_word(word).ok_or_else(|| {
-            Failure::new(Code::UnknownFormat, "no format has this name")
-                .at(word)
-                .help(format!("choose msh22, or an ending without its dot: {ENDINGS}"))
-        })?),
-        None => None,
-    };
-    let regions = match &args.region {
-        Some(text) => regions(text, &show::region_names(&args.store)?)?,
-        None => Vec::new(),
-    };
-    let mut selection = ExportSelection {
-        subdomains: args.subdomain.iter().copied().collect(),
-        regions: regions.into_iter().collect(),
-        pieces: args.pieces,
-        share: args.share,
-        content: match (args.boundary, args.interfaces) {
-            (true, _) => Content::Boundary,
-            (_, true) => Content::Interfaces,
-            _ => Content::Mesh,
-        },
-        format,
-        ascii: args.ascii,
-        ghosts: args.ghosts,
-        split_sheets: args.split_sheets,
-        order: match args.order {
-            2 => ElementOrder::Second,
-            _ => ElementOrder::First,
-        },
-    };
+    let options = options(args, &settings)?;
     let mut outs = Vec::new();
     for out in &args.out {
-        if format.is_none() {
+        if args.format.is_none() {
             check_format(out)?;
         }
-        let format = check(out, &selection).map_err(Error::from)?;
-        let of_ranks = share_of_ranks().filter(|_| selection.in_pieces(format));
-        let writers = selection.is_shared_file(format).then(writers).flatten();
+        let format = options.check(out)?;
+        let of_ranks = share_of_ranks().filter(|_| options.is_in_pieces(format));
+        let writers = options.is_shared_file(format).then(writers).flatten();
         let is_shared = of_ranks.is_some() && args.share.is_none() || writers.is_some();
-        outs.push((out, args.share.or(of_ranks), is_first || is_shared, writers));
+        outs.push((out, of_ranks, is_first || is_shared, writers));
     }
     let to_stdout = args.out.iter().any(|out| out == Path::new("-"));
     if to_stdout && (console.is_json() || args.out.len() > 1) {
@@ -123,16 +91,51 @@ fn write_share(
         let inputs = inputs_of(&args.store);
         args.out.iter().try_for_each(|out| check_target(out, &inputs))?;
     }
+    let store = Store::open_with(&args.store, settings)?;
     let mut reports = Vec::new();
-    for (out, share, is_ours, writers) in &outs {
-        selection.share = *share;
-        let writers = writers.as_deref();
-        reports.push(match is_ours {
-            true => write_with((&args.store, out), &selection, &settings, console, writers)?,
-            false => Exported::default(),
+    for (out, of_ranks, is_ours, writers) in outs {
+        let options = match of_ranks.filter(|_| args.share.is_none()) {
+            Some(Share { number, of }) => options.clone().share(number, of),
+            None => options.clone(),
+        };
+        reports.push(match (is_ours, writers) {
+            (false, _) => Exported::default(),
+            (true, None) => reported(store.export(out, &options)?, console),
+            (true, Some(w)) => reported(store.export_together(out, &options, &*w)?, console),
         });
     }
     Ok(reports)
+}
+
+/// The options of these arguments. Errors: what has no meaning, what the store does not have.
+fn options(args: &ExportArgs, settings: &Settings) -> Result<ExportOptions, Failure> {
+    let mut options = ExportOptions::new().subdomains(&args.subdomain);
+    if let Some(word) = &args.format {
+        options = options.format(MeshFormat::from_word(word).ok_or_else(|| {
+            Failure::new(Code::UnknownFormat, "no format has this name")
+                .at(word)
+                .help(format!("choose msh22, or an ending without its dot: {MESH_ENDINGS}"))
+        })?);
+    }
+    if let Some(text) = &args.region {
+        let store = Store::open_with(&args.store, settings.clone())?;
+        options = options.regions(&regions(text, store.summary())?);
+    }
+    if let Some(Share { number, of }) = args.share {
+        options = options.share(number, of);
+    }
+    let flags: [(bool, fn(ExportOptions) -> ExportOptions); 8] = [
+        (args.pieces, ExportOptions::pieces),
+        (args.boundary, ExportOptions::boundary),
+        (args.interfaces, ExportOptions::interfaces),
+        (args.ascii, ExportOptions::ascii),
+        (args.ghosts, ExportOptions::ghosts),
+        (args.split_sheets, ExportOptions::split_sheets),
+        (args.order == 2, ExportOptions::second_order),
+        (args.force, ExportOptions::over_inputs),
+    ];
+    let given = flags.into_iter().filter(|(is_given, _)| *is_given);
+    Ok(given.fold(options, |options, (_, add)| add(options)))
 }
 
 /// The question about all tetrahedra whose answer is to be written, where that is asked for: rows of values.
@@ -184,33 +187,26 @@ pub fn check_format(out: &Path) -> Result<(), Failure> {
             "the format of a mesh file does not follow from its name",
         )
         .at(out.display())
-        .help(format!("end the name with {ENDINGS}"))),
+        .help(format!("end the name with {MESH_ENDINGS}"))),
     }
 }
 
-/// Writes one file, and what belongs to it.
+/// Writes the whole mesh, also over an input: which files may be written was checked before the run.
 pub fn write(
     path: &Path,
     out: &Path,
-    selection: &ExportSelection,
     settings: &Settings,
     console: &Console,
-) -> Result<Exported, Failure> {
-    write_with((path, out), selection, settings, console, None)
+) -> Result<(), Failure> {
+    let store = Store::open_with(path, settings.clone())?;
+    reported(store.export(out, &ExportOptions::new().over_inputs())?, console);
+    Ok(())
 }
 
-/// The same, as one of several processes that write the file together.
-fn write_with(
-    (path, out): (&Path, &Path),
-    selection: &ExportSelection,
-    settings: &Settings,
-    console: &Console,
-    writers: Option<&dyn Writers>,
-) -> Result<Exported, Failure> {
-    let exported = show::export_with(path, (out, selection), settings, writers)?;
+fn reported(exported: Exported, console: &Console) -> Exported {
     console.done();
     note(&exported, console);
-    Ok(exported)
+    exported
 }
 
 fn note(exported: &Exported, console: &Console) {

@@ -1,17 +1,7 @@
 //! Errors as the user sees them: a word, an exit code, what happened, where, what to do.
 
-use tetdb_base::storage::StorageError;
-use tetdb_base::surface::SurfaceError;
-use tetdb_engine::api::Code;
 use tetdb_engine::api::error::{Error, Remedy};
-use tetdb_engine::pipeline::PipelineError;
-use tetdb_io::read::ReadError;
-use tetdb_io::write::WriteError;
-use tetdb_kernel::boundary::BoundaryError;
-use tetdb_kernel::sizing::{SizeWarning, SizingError};
-use tetdb_store::query::QueryError;
-use tetdb_store::sealed::SealedError;
-use tetdb_store::store::StoreError;
+use tetdb_engine::api::{Code, SizeWarning};
 
 /// An error on its way to the user.
 #[derive(Debug)]
@@ -67,30 +57,6 @@ impl From<Error> for Failure {
         }
     }
 }
-
-/// Errors of the modules below, by way of the front door's.
-macro_rules! failures {
-    ($($error:ty),*) => {$(
-        impl From<$error> for Failure {
-            fn from(e: $error) -> Self {
-                Error::from(e).into()
-            }
-        }
-    )*};
-}
-
-failures!(
-    BoundaryError,
-    PipelineError,
-    QueryError,
-    ReadError,
-    SealedError,
-    SizingError,
-    StorageError,
-    StoreError,
-    SurfaceError,
-    WriteError
-);
 
 /// The option of a file of options as it is typed.
 fn flag(option: &str) -> String {

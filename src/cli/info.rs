@@ -10,10 +10,9 @@ use super::failure::Failure;
 use super::memory;
 use super::tasks;
 use super::words::{self, count};
-use tetdb_engine::api::page::measure_excess;
-use tetdb_engine::api::{RegionInfo, StoreInfo, Tasks, short};
-use tetdb_engine::data::schema::catalog::{QualityRow, StoreState};
-use tetdb_engine::view::Excess;
+use tetdb_engine::api::{
+    Excess, QualityRow, RegionInfo, Store, StoreInfo, StoreState, Tasks, short,
+};
 
 /// Regions listed for people.
 const REGIONS_LISTED: usize = 12;
@@ -26,8 +25,9 @@ pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
     // The rows of a catalog are far less than the least cap.
     let memory = memory::asked(args.of.memory.as_deref())?;
     let path = &args.of.store;
-    let excess =
-        (args.excess).then(|| measure_excess(path, &console.settings(memory, None))).transpose()?;
+    let excess = (args.excess)
+        .then(|| Store::open_with(path, console.settings(memory, None))?.excess())
+        .transpose()?;
     console.done();
     if console.is_json() {
         let mut all = object(path)?;

@@ -48,6 +48,8 @@ use console::Console;
 use failure::Failure;
 
 use tetdb_engine::api::guarded;
+#[cfg(feature = "mpi")]
+use tetdb_engine::api::mpi::Ranks;
 
 /// Runs the command line of this process and returns its exit code.
 pub fn run() -> ExitCode {
@@ -70,8 +72,8 @@ pub fn run() -> ExitCode {
 
 /// Rank 0 is the program as ever; of the others only that one says what is wrong with the command line.
 #[cfg(feature = "mpi")]
-fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
-    if ranks.rank == 0 {
+fn run_rank(ranks: &Ranks) -> ExitCode {
+    if ranks.is_first() {
         return run_alone();
     }
     let Ok(args) = Args::try_parse() else {
@@ -85,12 +87,16 @@ fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
             Err(failure) => ExitCode::from(failure.exit()),
         };
     }
-    ExitCode::from(ranks.serve(|| match &args.command {
-        Command::Mesh(args) => mesh::begin(&args.run, &[], &console),
-        Command::Resume(args) => mesh::begin(&args.run, &[], &console),
-        Command::Verify(args) => verify::settings(args, &console),
-        _ => Err(Failure::new(Code::Internal, "a rank was asked for what it cannot do")),
-    }))
+    ranks.serve(tasks::scratch_of_machine(), || {
+        let settings = match &args.command {
+            Command::Mesh(args) => mesh::begin(&args.run, &[], &console),
+            Command::Resume(args) => mesh::begin(&args.run, &[], &console),
+            Command::Verify(args) => verify::settings(args, &console),
+            _ => Err(Failure::new(Code::Internal, "a rank was asked for what it cannot do")),
+        };
+        settings.map_err(|failure| (failure.code, failure.message))
+    });
+    ExitCode::SUCCESS
 }
 
 /// Signals end the run from now on.

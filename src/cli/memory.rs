@@ -2,10 +2,9 @@
 
 use super::failure::Failure;
 use tetdb_engine::api::Code;
-use tetdb_engine::api::default_cap;
 pub use tetdb_engine::api::peak_bytes as peak;
 pub(super) use tetdb_engine::api::show_bytes as show;
-use tetdb_engine::pipeline::MEMORY_MIN;
+use tetdb_engine::api::{MEMORY_LEAST, default_cap};
 
 /// The cap in bytes: what is asked for, or a share of what is free. Errors: as [`asked`].
 pub fn cap(option: Option<&str>) -> Result<u64, Failure> {
@@ -16,8 +15,8 @@ pub fn cap(option: Option<&str>) -> Result<u64, Failure> {
 pub fn asked(option: Option<&str>) -> Result<Option<u64>, Failure> {
     let Some(text) = option else { return Ok(None) };
     let bytes = parse(text)?;
-    if bytes < MEMORY_MIN {
-        let least = MEMORY_MIN >> 20;
+    if bytes < MEMORY_LEAST.0 {
+        let least = MEMORY_LEAST.0 >> 20;
         let message = format!("--memory {text} is less than the {least} MiB any run needs");
         let help = format!("give at least --memory {least}MiB");
         return Err(Failure::new(Code::Memory, message).help(help));

@@ -10,9 +10,9 @@ use super::failure::Failure;
 use super::input;
 use super::{config, export, info, memory, threads};
 use tetdb_engine::api::targets::{check_target, inputs_of};
-use tetdb_engine::api::{Code, Existing, Mesher, SAMPLE_PREFIX, Settings, resume_reported};
-use tetdb_engine::pipeline::Summary;
-use tetdb_io::write::ExportSelection;
+use tetdb_engine::api::{
+    Code, Existing, Mesher, SAMPLE_PREFIX, Settings, Traffic, resume_reported,
+};
 
 pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     if let Some(file) = args.output.as_deref().filter(|out| export::check_format(out).is_ok()) {
@@ -55,7 +55,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     if args.coarse_only {
         return begun(&path, &settings, console);
     }
-    finish(&path, &args.run, &settings, created.summary.as_ref(), console)
+    finish(&path, &args.run, &settings, created.traffic, console)
 }
 
 /// What can be done with a coarse mesh.
@@ -79,7 +79,7 @@ pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
     let settings = begin(&args.run, &inputs_of(&args.store), console)?;
     let created = resume_reported(&args.store, &settings, !args.run.no_verify)?;
     console.done();
-    finish(&args.store, &args.run, &settings, created.summary.as_ref(), console)
+    finish(&args.store, &args.run, &settings, created.traffic, console)
 }
 
 /// Threads, signals, and the cap; nothing that is written may be one of `inputs`.
@@ -98,7 +98,7 @@ pub(super) fn begin(
     let mut settings = console.settings(cap, threads);
     #[cfg(feature = "mpi")]
     {
-        settings.hands = super::ranks::hands();
+        settings = super::ranks::share_work(settings);
     }
     Ok(settings)
 }
@@ -119,7 +119,7 @@ fn finish(
     path: &Path,
     args: &RunArgs,
     settings: &Settings,
-    summary: Option<&Summary>,
+    traffic: Option<Traffic>,
     console: &Console,
 ) -> Result<u8, Failure> {
     write_exports(path, args, settings, console)?;
@@ -128,15 +128,15 @@ fn finish(
         let mut answer = info::object(path)?;
         answer["memory_cap_bytes"] = json!(cap);
         answer["peak_bytes"] = json!(memory::peak());
-        if let Some(s) = summary {
-            answer["pages_read"] = json!(s.pages.pages_read);
-            answer["pages_written"] = json!(s.pages.pages_written);
-            answer["frames_used"] = json!(s.frames_used);
+        if let Some(traffic) = traffic {
+            answer["pages_read"] = json!(traffic.pages_read);
+            answer["pages_written"] = json!(traffic.pages_written);
+            answer["frames_used"] = json!(traffic.frames_used);
         }
         console.answer(&answer);
     } else if !console.is_quiet() {
         info::print(path, console)?;
-        if let Some(peak) = memory::peak().filter(|_| summary.is_some()) {
+        if let Some(peak) = memory::peak().filter(|_| traffic.is_some()) {
             console.line(&format!("peak memory {} of {}", memory::show(peak), memory::show(cap)));
         }
         let page = path.with_extension("html");
@@ -155,7 +155,7 @@ pub(super) fn write_exports(
     console: &Console,
 ) -> Result<(), Failure> {
     for out in &args.export {
-        export::write(path, out, &ExportSelection::default(), settings, console)?;
+        export::write(path, out, settings, console)?;
     }
     Ok(())
 }

@@ -3,27 +3,23 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, stdin};
 use std::path::Path;
-use tetdb_schema::code::Code;
 
 use super::args::QueryArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
-use super::query_ask::{bad, point, selection};
-use super::query_rows::{FileSink, QueryColumn, Row, Sink, Writer};
-use tetdb_base::geom::Point;
-use tetdb_base::storage::{Budget, attempt};
-use tetdb_engine::api::store::open_finished;
-use tetdb_engine::api::targets::{check_target, inputs_of};
-use tetdb_store::query::{Hit, Ordered, QueryError, QuerySession, VARIABLES};
+use super::query_ask::{bad, point, query};
+use super::query_rows::{Sink, Writer};
+use tetdb_engine::api::{
+    AnswerColumn, AnswerFile, AnswerRow, Code, Order, Settings, Store, VARIABLES, check_target,
+    inputs_of,
+};
 
 /// Memory of a point on its way to its answer.
 const POINT_BYTES: u64 = 512;
-/// The place of quality among the variables.
-const QUALITY: usize = 0;
 /// No line of a point is longer.
 const LINE_MAX: u64 = 4096;
-/// The place of excess.
+/// The place of excess among the variables.
 const EXCESS: usize = VARIABLES.len() - 1;
 /// Points answered together, at most.
 const POINTS_MAX: u64 = 1 << 17;
@@ -33,62 +29,62 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
         let inputs = inputs_of(&args.store).into_iter().chain(args.points.clone());
         check_target(out, &inputs.collect::<Vec<_>>())?;
     }
-    let cap = memory::cap(args.memory.as_deref())?;
-    let budget = Budget::new(cap);
+    let settings = console.settings(memory::asked(args.memory.as_deref())?, None);
     let columns = columns(args)?;
     let order = order(args)?;
-    let open = open_finished(&args.store)?;
-    let mut inquiry = QuerySession::open(open, &budget)?;
-    let lease = budget.lease(cap / 8, "answers")?;
-    attempt(|| -> Result<u8, Failure> {
-        let n = if args.point.is_empty() && args.points.is_none() {
-            let mut selection = selection(args, &mut inquiry)?;
-            selection.excess = columns.contains(&QueryColumn::Variable(EXCESS))
-                || order.is_some_and(|(variable, _)| variable == EXCESS);
-            let mut writer = writer(args, columns, cap, console)?;
-            let n = match order {
-                Some((QUALITY, descending))
-                    if few(args.limit, lease.bytes()) && inquiry.has_extremes(&selection) =>
-                {
-                    let limit = args.limit.unwrap_or_default() as usize;
-                    let found = inquiry.extreme(&selection, descending, limit)?;
-                    put(found.into_iter().map(Ok), args.limit, &mut writer)?
-                }
-                Some((variable, descending)) => {
-                    let found = inquiry.select(selection)?;
-                    let dir = std::env::temp_dir();
-                    let sorted = Ordered::new(found, variable, descending, &dir, lease.bytes())?;
-                    put(sorted, args.limit, &mut writer)?
-                }
-                None => put(inquiry.select(selection)?, args.limit, &mut writer)?,
-            };
+    let mut store = Store::open_with(&args.store, settings.clone())?;
+    let n = match args.point.is_empty() && args.points.is_none() {
+        true => select(args, &mut store, (columns, order), &settings, console)?,
+        false => {
+            let mut writer = writer(args, columns, &settings, console)?;
+            let n = locate(args, &mut store, settings.cap()? / 8, &mut writer)?;
             end(writer, console)?;
             n
-        } else {
-            let mut writer = writer(args, columns, cap, console)?;
-            let n = locate(args, &mut inquiry, lease.bytes(), &mut writer)?;
-            end(writer, console)?;
-            n
-        };
-        tell(n, args.limit, &inquiry, console);
-        Ok(0)
-    })?
+        }
+    };
+    report_count(n, args.limit, &mut store, console)?;
+    Ok(0)
 }
 
-/// Whether so many answers are held at once without a thought.
-fn few(limit: Option<u64>, memory: u64) -> bool {
-    limit.is_some_and(|n| n.saturating_mul(2 * size_of::<Hit>() as u64) <= memory)
+/// Answers with tetrahedra. Returns how many.
+fn select(
+    args: &QueryArgs,
+    store: &mut Store,
+    (columns, order): (Vec<AnswerColumn>, Option<(&str, Order)>),
+    settings: &Settings,
+    console: &Console,
+) -> Result<u64, Failure> {
+    let mut query = query(args, store)?;
+    if columns.contains(&AnswerColumn::Variable(EXCESS)) {
+        query = query.with_excess();
+    }
+    if let Some((variable, order)) = order {
+        query = query.order_by(variable, order)?;
+    }
+    if let Some(limit) = args.limit {
+        query = query.limit(usize::try_from(limit).unwrap_or(usize::MAX));
+    }
+    let mut writer = writer(args, columns, settings, console)?;
+    let mut n = 0;
+    for hit in query.answers()? {
+        n += 1;
+        if !writer.put(&hit?.into())? {
+            break;
+        }
+    }
+    end(writer, console)?;
+    Ok(n)
 }
 
 fn writer(
     args: &QueryArgs,
-    columns: Vec<QueryColumn>,
-    cap: u64,
+    columns: Vec<AnswerColumn>,
+    settings: &Settings,
     console: &Console,
 ) -> Result<Writer, Failure> {
     let sink = match &args.output {
         Some(out) => {
-            let file = FileSink::new(out, &columns, cap / 16)?;
+            let file = AnswerFile::create(out, &columns, settings)?;
             Sink::File(Box::new(file), out.clone())
         }
         None if args.json => Sink::Objects,
@@ -106,9 +102,14 @@ fn end(writer: Writer, console: &Console) -> Result<(), Failure> {
     Ok(())
 }
 
-fn tell(n: u64, limit: Option<u64>, inquiry: &QuerySession, console: &Console) {
-    let measures = inquiry.measures();
-    console.measures(&serde_json::json!({ "found": n, "chunks": measures }));
+fn report_count(
+    n: u64,
+    limit: Option<u64>,
+    store: &mut Store,
+    console: &Console,
+) -> Result<(), Failure> {
+    let chunks = store.chunk_counts()?;
+    console.measures(&serde_json::json!({ "found": n, "chunks": chunks }));
     if !console.is_json() {
         let found = match limit == Some(n) {
             true => format!("{n} shown, as many as were asked for"),
@@ -116,15 +117,16 @@ fn tell(n: u64, limit: Option<u64>, inquiry: &QuerySession, console: &Console) {
         };
         console.note(&format!(
             "{found}; read {} of {} chunks of tetrahedra, {} of {} of vertices",
-            measures.tet_chunks_read,
-            measures.tet_chunks,
-            measures.vertex_chunks_read,
-            measures.vertex_chunks
+            chunks.tet_chunks_read,
+            chunks.tet_chunks,
+            chunks.vertex_chunks_read,
+            chunks.vertex_chunks
         ));
     }
+    Ok(())
 }
 
-fn columns(args: &QueryArgs) -> Result<Vec<QueryColumn>, Failure> {
+fn columns(args: &QueryArgs) -> Result<Vec<AnswerColumn>, Failure> {
     let of_points = !args.point.is_empty() || args.points.is_some();
     let default = match args.json || args.output.is_some() {
         true => "id,subdomain,region,quality,volume,vertices,points",
@@ -135,56 +137,40 @@ fn columns(args: &QueryArgs) -> Result<Vec<QueryColumn>, Failure> {
     let columns = names.split(',').map(|name| {
         let name = name.trim();
         let known = || format!("columns among id, vertices, points, {}", VARIABLES.join(", "));
-        QueryColumn::named(name).ok_or_else(|| bad("--select", name, &known()))
+        AnswerColumn::from_name(name).ok_or_else(|| bad("--select", name, &known()))
     });
     let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
     if of_points {
-        if columns.contains(&QueryColumn::Variable(EXCESS)) {
+        if columns.contains(&AnswerColumn::Variable(EXCESS)) {
             return Err(bad("--select", "excess", "no excess where points are asked for"));
         }
-        columns.insert(0, QueryColumn::Point);
-        columns.push(QueryColumn::Barycentric);
+        columns.insert(0, AnswerColumn::Point);
+        columns.push(AnswerColumn::Barycentric);
     }
     Ok(columns)
 }
 
-/// The variable answers are sorted by, and whether they fall.
-fn order(args: &QueryArgs) -> Result<Option<(usize, bool)>, Failure> {
+/// The variable answers are sorted by, and in which order.
+fn order(args: &QueryArgs) -> Result<Option<(&str, Order)>, Failure> {
     let Some(text) = &args.order_by else {
         return Ok(None);
     };
-    let falling = text.starts_with('-');
     let name = text.trim_start_matches('-');
-    match VARIABLES.iter().position(|v| *v == name) {
-        Some(variable) => Ok(Some((variable, falling != args.desc))),
-        None => {
-            let known = format!("one of {}", VARIABLES.join(", "));
-            Err(bad("--order-by", text, &known))
-        }
+    if !VARIABLES.contains(&name) {
+        let known = format!("one of {}", VARIABLES.join(", "));
+        return Err(bad("--order-by", text, &known));
     }
-}
-
-fn put(
-    found: impl Iterator<Item = Result<Hit, QueryError>>,
-    limit: Option<u64>,
-    writer: &mut Writer,
-) -> Result<u64, Failure> {
-    let mut n = 0;
-    let limit = limit.map_or(usize::MAX, |n| usize::try_from(n).unwrap_or(usize::MAX));
-    for found in found.take(limit) {
-        n += 1;
-        let row = Row { found: Some(found?), located: None };
-        if !writer.put(&row)? {
-            break;
-        }
-    }
-    Ok(n)
+    let order = match text.starts_with('-') != args.desc {
+        true => Order::Falling,
+        false => Order::Rising,
+    };
+    Ok(Some((name, order)))
 }
 
 /// Answers points in blocks that fit the memory. Returns how many are in the mesh.
 fn locate(
     args: &QueryArgs,
-    inquiry: &mut QuerySession,
+    store: &mut Store,
     memory: u64,
     writer: &mut Writer,
 ) -> Result<u64, Failure> {
@@ -194,10 +180,10 @@ fn locate(
     for text in &args.point {
         points.push(point("--point", text)?);
     }
-    let mut answer = |points: &mut Vec<Point>, writer: &mut Writer| -> Result<bool, Failure> {
-        for located in inquiry.locate(points)? {
-            n += u64::from(located.found.is_some());
-            let row = Row { found: located.found, located: Some(located) };
+    let mut answer = |points: &mut Vec<[f64; 3]>, writer: &mut Writer| -> Result<bool, Failure> {
+        for (point, found) in points.iter().zip(store.locate_barycentric(points)?) {
+            n += u64::from(found.is_some());
+            let row = AnswerRow::from_point(*point, found);
             if !writer.put(&row)? {
                 return Ok(false);
             }
@@ -247,7 +233,7 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
 }
 
 /// Three numbers with commas or spaces between; nothing in empty lines and behind `#`.
-fn parse_line(path: &Path, number: u64, line: &str) -> Result<Option<Point>, Failure> {
+fn parse_line(path: &Path, number: u64, line: &str) -> Result<Option<[f64; 3]>, Failure> {
     let text = line.split('#').next().unwrap_or_default().trim();
     if text.is_empty() {
         return Ok(None);
@@ -273,5 +259,5 @@ fn parse_line(path: &Path, number: u64, line: &str) -> Result<Option<Point>, Fai
             return Err(fault(Code::NotANumber, message));
         }
     }
-    Ok(Some(Point::from_array(point)))
+    Ok(Some(point))
 }

@@ -2,10 +2,7 @@
 
 use super::args::QueryArgs;
 use super::failure::Failure;
-use tetdb_base::expr::{ExprError, ExprKind, Expression};
-use tetdb_base::geom::{Aabb, Point};
-use tetdb_schema::code::Code;
-use tetdb_store::query::{QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called};
+use tetdb_engine::api::{Code, Condition, ExprError, Query, Store, Summary};
 
 /// An option's value that makes no sense.
 pub fn bad(option: &str, found: &str, expected: &str) -> Failure {
@@ -14,7 +11,7 @@ pub fn bad(option: &str, found: &str, expected: &str) -> Failure {
 }
 
 /// An expression that cannot be read, with a caret under the place.
-pub fn bad_expression(text: &str, error: &ExprError) -> Failure {
+fn bad_expression(text: &str, error: &ExprError) -> Failure {
     let line: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let before = text[..error.at].chars().count();
     // The place is told behind "  at: ".
@@ -38,8 +35,8 @@ pub fn numbers<const N: usize>(
 }
 
 /// A point as typed.
-pub fn point(option: &str, text: &str) -> Result<Point, Failure> {
-    numbers::<3>(option, text, "three numbers such as 0.1,0.2,0.3").map(Point::from_array)
+pub fn point(option: &str, text: &str) -> Result<[f64; 3], Failure> {
+    numbers(option, text, "three numbers such as 0.1,0.2,0.3")
 }
 
 /// Words separated by commas, each read by its kind.
@@ -50,46 +47,53 @@ fn list<T: std::str::FromStr>(option: &str, text: &str, expected: &str) -> Resul
 
 const RANKS: &str = "numbers such as 0,3";
 
-/// The selection of these arguments. Errors: what has no meaning, what the store does not have.
-pub fn selection(args: &QueryArgs, inquiry: &mut QuerySession) -> Result<Selection, Failure> {
-    let mut selection = Selection {
-        solids: solids(args)?,
-        inside: args.inside,
-        touching_surface: args.touching_surface,
-        touching_sheet: args.touching_sheet,
-        ..Selection::default()
-    };
-    if args.inside && selection.solids.is_empty() {
+/// The query of these arguments. Errors: what has no meaning, what the store does not have.
+pub fn query<'s>(args: &QueryArgs, store: &'s mut Store) -> Result<Query<'s>, Failure> {
+    let summary = store.summary();
+    if args.inside && args.boxes.is_empty() && args.sphere.is_empty() {
         return Err(bad("--inside", "", "a --box or --sphere to be inside of"));
     }
-    let ranks = |option, text: &Option<String>| match text {
-        Some(text) => list(option, text, RANKS).map(Some),
-        None => Ok(None),
-    };
-    selection.subdomains = ranks("--subdomain", &args.subdomain)?;
-    if let Some(text) = &args.region {
-        selection.regions = Some(regions(text, &inquiry.region_names)?);
+    let regions = args.region.as_ref().map(|text| regions(text, summary)).transpose()?;
+    let labels = args.label.as_ref().map(|text| {
+        text.split(',').map(|name| summary.label_called(name.trim())).collect::<Result<Vec<_>, _>>()
+    });
+    let labels = labels.transpose()?;
+    let mut query = places(args, store.query())?;
+    if args.inside {
+        query = query.inside();
     }
-    if let Some(text) = &args.label {
-        let names = text.split(',').map(|name| label(inquiry, name.trim()));
-        selection.labels = Some(names.collect::<Result<_, _>>()?);
+    if args.touching_surface {
+        query = query.touching_surface();
+    }
+    if args.touching_sheet {
+        query = query.touching_sheet();
+    }
+    if let Some(text) = &args.subdomain {
+        query = query.in_subdomains(&list("--subdomain", text, RANKS)?);
+    }
+    if let Some(regions) = regions {
+        query = query.in_regions(&regions);
+    }
+    if let Some(labels) = labels {
+        query = query.on_labels(&labels);
     }
     if let Some(text) = &args.interface {
-        let pair: Vec<u32> = list("--interface", text, "two sub-domains such as 0,1")?;
-        let pair: [u32; 2] =
-            pair.try_into().map_err(|_| bad("--interface", text, "two sub-domains such as 0,1"))?;
-        selection.interface = Some(pair);
+        let expected = "two sub-domains such as 0,1";
+        match list("--interface", text, expected)?[..] {
+            [low, high] => query = query.on_interface(low, high),
+            _ => return Err(bad("--interface", text, expected)),
+        }
     }
     if let Some(text) = &args.tet {
-        selection.tets = Some(list("--tet", text, "tetrahedra such as 7:1048211")?);
+        query = query.among(&list("--tet", text, "tetrahedra such as 7:1048211")?);
     }
     if let Some(text) = &args.condition {
-        selection.condition = Some(condition(text)?);
+        query = query.condition(condition(text)?);
     }
     if let Some(text) = &args.neighbors {
         let id = text.parse();
         let id = id.map_err(|_| bad("--neighbors", text, "a tetrahedron such as 7:1048211"))?;
-        selection.sharing = Some(inquiry.next_to(id)?);
+        query = query.next_to(id)?;
     }
     for (option, text, n) in [("--ball", &args.ball, 1), ("--shell", &args.shell, 2)] {
         let Some(text) = text else { continue };
@@ -99,36 +103,34 @@ pub fn selection(args: &QueryArgs, inquiry: &mut QuerySession) -> Result<Selecti
         if vertices.len() != n {
             return Err(bad(option, text, expected));
         }
-        selection.sharing = Some(inquiry.around(&vertices)?);
+        query = query.around(&vertices)?;
     }
-    Ok(selection)
+    Ok(query)
 }
 
-/// Regions by number or name; `names` are those from region 1 on.
-pub(super) fn regions(text: &str, names: &[String]) -> Result<Vec<u32>, Failure> {
+/// Regions by number or name.
+pub(super) fn regions(text: &str, summary: &Summary) -> Result<Vec<u32>, Failure> {
     let mut found = Vec::new();
     for word in text.split(',').map(str::trim) {
         match word.parse() {
             Ok(region) => found.push(region),
-            Err(_) if word.is_empty() || names.is_empty() => {
+            Err(_) if word.is_empty() || summary.region_names.is_empty() => {
                 return Err(bad("--region", text, RANKS));
             }
-            Err(_) => found.extend(regions_called(names, word)?),
+            Err(_) => found.extend(summary.regions_called(word)?),
         }
     }
     Ok(found)
 }
 
-fn solids(args: &QueryArgs) -> Result<Vec<Solid>, Failure> {
-    let mut solids = Vec::new();
+fn places<'s>(args: &QueryArgs, mut query: Query<'s>) -> Result<Query<'s>, Failure> {
     for text in &args.boxes {
         let expected = "six numbers, the low corner and the high one";
         let [x0, y0, z0, x1, y1, z1] = numbers("--box", text, expected)?;
-        let (low, high) = (Point::new(x0, y0, z0), Point::new(x1, y1, z1));
-        if !low.cmple(high).all() {
+        if x0 > x1 || y0 > y1 || z0 > z1 {
             return Err(bad("--box", text, expected));
         }
-        solids.push(Solid::Box(Aabb { low, high }));
+        query = query.in_box([x0, y0, z0], [x1, y1, z1]);
     }
     for text in &args.sphere {
         let expected = "four numbers, a center and a radius";
@@ -136,41 +138,20 @@ fn solids(args: &QueryArgs) -> Result<Vec<Solid>, Failure> {
         if radius < 0.0 {
             return Err(bad("--sphere", text, expected));
         }
-        let center = Point::new(x, y, z);
-        solids.push(Solid::Sphere { center, radius });
+        query = query.in_sphere([x, y, z], radius);
     }
     for text in &args.plane {
         let expected = "six numbers, a point and a direction";
         let [x, y, z, nx, ny, nz] = numbers("--plane", text, expected)?;
-        let (point, normal) = (Point::new(x, y, z), Point::new(nx, ny, nz));
-        if normal == Point::ZERO {
+        if [nx, ny, nz] == [0.0; 3] {
             return Err(bad("--plane", text, expected));
         }
-        solids.push(Solid::Plane { point, normal });
+        query = query.at_plane([x, y, z], [nx, ny, nz]);
     }
-    Ok(solids)
+    Ok(query)
 }
 
 /// A truth about the variables of a query.
-pub fn condition(text: &str) -> Result<Expression, Failure> {
-    let condition =
-        Expression::parse(text, &VARIABLES).map_err(|error| bad_expression(text, &error))?;
-    if condition.kind() == ExprKind::Truth {
-        return Ok(condition);
-    }
-    let error = ExprError {
-        at: 0,
-        message: "this is a number; a condition compares, such as `quality > 6`".to_owned(),
-    };
-    Err(bad_expression(text, &error))
-}
-
-/// A label by its name or, where nothing is called so, its number.
-fn label(inquiry: &QuerySession, name: &str) -> Result<u32, Failure> {
-    let known = inquiry.labels();
-    let by_name = known.iter().position(|label| label == name);
-    let place = by_name.or_else(|| name.parse().ok().filter(|&n| n < known.len()));
-    place
-        .map(|n| n as u32)
-        .ok_or_else(|| QueryError::NoLabel { name: name.to_owned(), known: known.to_vec() }.into())
+pub fn condition(text: &str) -> Result<Condition, Failure> {
+    Condition::parse(text).map_err(|error| bad_expression(text, &error))
 }

@@ -9,7 +9,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::{input, memory};
 use tetdb_engine::api::targets::check_target;
-use tetdb_engine::api::{OptionsText, Surface, short};
+use tetdb_engine::api::{Error, OptionsText, Surface, short};
 
 pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     let sizes = OptionsText {
@@ -17,7 +17,7 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
         hgrad: args.hgrad.clone(),
         ..OptionsText::default()
     };
-    let sizes = sizes.sizes()?;
+    let sizes = sizes.sizes().map_err(Error::from)?;
     let Some(h) = sizes.hsiz else {
         unreachable!("it was given");
     };

@@ -6,23 +6,20 @@ use super::args::ReportArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
-use tetdb_engine::api::page::write_page;
-use tetdb_engine::api::targets::{check_target, inputs_of};
+use tetdb_engine::api::Store;
 
 pub fn run(args: &ReportArgs, console: &Console) -> Result<u8, Failure> {
-    check_target(&args.output, &inputs_of(&args.store))?;
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
-    let written = write_page(&args.store, &args.output, &settings)?;
+    let reported = Store::open_with(&args.store, settings)?.report(&args.output)?;
     console.done();
-    let (file, scene) = (args.output.display(), &written.scene);
+    let file = args.output.display().to_string();
     if console.is_json() {
-        let shown = |name: &str| json!({ "of": scene[name]["of"], "shown": scene[name]["shown"] });
-        console.answer(&json!({
-            "schema": 1, "file": file.to_string(), "bytes": written.bytes, "boundary": shown("boundary"),
-            "interfaces": shown("interfaces"), "chunks": written.measures,
-        }));
+        let mut answer = json!(reported);
+        answer["schema"] = json!(1);
+        answer["file"] = json!(file);
+        console.answer(&answer);
     } else {
-        console.note(&format!("wrote {file} ({})", memory::show(written.bytes)));
+        console.note(&format!("wrote {file} ({})", memory::show(reported.bytes)));
     }
     Ok(0)
 }

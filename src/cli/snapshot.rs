@@ -5,27 +5,25 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::query_ask::{bad, condition, numbers};
-use tetdb_engine::api::picture::take;
-use tetdb_engine::api::targets::{check_target, inputs_of};
-use tetdb_engine::api::{ColorBy, Snapped, Snapshot};
-use tetdb_schema::code::Code;
+use tetdb_engine::api::{Code, ColorBy, Snapped, Snapshot, Store};
 
 /// Least and greatest side of a picture in pixels.
 const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;
 
 pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
-    check_target(&args.output, &inputs_of(&args.store))?;
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let snapshot = snapshot(args).map_err(|error| match error.code {
         Code::BadQuery => error.help("`tetdb snapshot --help` has examples"),
         _ => error,
     })?;
-    let snapped = take(&args.store, &args.output, &snapshot, &settings);
-    let snapped = snapped.map_err(|error| match (error.code(), &args.plane) {
-        (Code::BadQuery, Some(plane)) => {
-            bad("--plane", plane, "a plane that cuts tetrahedra of the mesh")
+    let store = Store::open_with(&args.store, settings)?;
+    let snapped = store.snapshot(&args.output, &snapshot).map_err(|error| {
+        match (error.code(), &args.plane) {
+            (Code::BadQuery, Some(plane)) => {
+                bad("--plane", plane, "a plane that cuts tetrahedra of the mesh")
+            }
+            _ => error.into(),
         }
-        _ => error.into(),
     })?;
     console.done();
     print(args, &snapped, console);
@@ -66,7 +64,7 @@ fn snapshot(args: &SnapshotArgs) -> Result<Snapshot, Failure> {
         snapshot = snapshot.seen_from(from);
     }
     if let Some(text) = &args.condition {
-        snapshot = snapshot.with_condition(condition(text)?);
+        snapshot = snapshot.condition(condition(text)?);
     }
     Ok(match args.crinkle {
         true => snapshot.crinkle(),
@@ -101,21 +99,18 @@ fn subject(args: &SnapshotArgs) -> Result<(Snapshot, bool), Failure> {
 }
 
 fn print(args: &SnapshotArgs, snapped: &Snapped, console: &Console) {
-    let measures = snapped.measures;
+    let file = args.output.display().to_string();
     if console.is_json() {
-        console.answer(&serde_json::json!({
-            "schema": 1, "file": args.output.display().to_string(), "bytes": snapped.bytes, "pieces": snapped.pieces,
-            "quality": snapped.quality, "size": snapped.size, "chunks": measures,
-        }));
+        let mut answer = serde_json::json!(snapped);
+        answer["schema"] = 1.into();
+        answer["file"] = file.into();
+        console.answer(&answer);
         return;
     }
+    let (bytes, chunks) = (memory::show(snapped.bytes), snapped.chunks);
     console.note(&format!(
-        "wrote {} ({}): {} pieces; read {} of {} chunks of tetrahedra",
-        args.output.display(),
-        memory::show(snapped.bytes),
-        snapped.pieces,
-        measures.tet_chunks_read,
-        measures.tet_chunks
+        "wrote {file} ({bytes}): {} pieces; read {} of {} chunks of tetrahedra",
+        snapped.pieces, chunks.tet_chunks_read, chunks.tet_chunks
     ));
 }
 

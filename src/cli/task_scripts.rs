@@ -5,19 +5,10 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use tetdb_engine::pipeline::{Planned, Stage, StageKind};
+use tetdb_engine::api::{TaskStage, TaskStatus};
 
 /// Beside the cap: code and stacks.
 const MEMORY_BESIDE: u64 = 64 << 20;
-
-/// What the tasks of a stage do, in words.
-pub(super) fn kind(kind: StageKind) -> &'static str {
-    match kind {
-        StageKind::Cuts => "one cut each",
-        StageKind::Subtrees => "all cuts of a part",
-        StageKind::Subdomains => "sub-domains",
-    }
-}
 
 /// What a script is written from.
 pub(super) struct Script<'a> {
@@ -28,12 +19,12 @@ pub(super) struct Script<'a> {
     pub scratch: Option<PathBuf>,
     /// A mesh file to be written in pieces at the end.
     pub export: Option<PathBuf>,
-    pub planned: &'a Planned,
+    pub planned: &'a TaskStatus,
 }
 
 impl Script<'_> {
     /// Stages that are not complete, with their numbers from 1.
-    fn stages(&self) -> impl Iterator<Item = (usize, &Stage)> {
+    fn stages(&self) -> impl Iterator<Item = (usize, &TaskStage)> {
         (1..).zip(&self.planned.stages).skip(self.planned.stage)
     }
 
@@ -85,14 +76,14 @@ impl Script<'_> {
         text += "submit() { sbatch --parsable --kill-on-invalid-dep=yes ${SBATCH:-} \"$@\" | cut -d';' -f1; }\n";
         let (mut after, mut and) = (String::new(), "");
         for (number, stage) in self.stages() {
-            let offset = stage.first - 1;
+            let offset = stage.first_task - 1;
             let work = self.work(&format!("$((SLURM_ARRAY_TASK_ID + {offset}))"));
             let _ = writeln!(
                 text,
                 "# Stage {number}: {}.\na=$(submit{after} --job-name=tetdb-{number} --requeue --array=1-{} --mem={megabytes}M --cpus-per-task={} --wrap {})\n\
                  g=$(submit --dependency=afterany:$a{and} --job-name=tetdb-gather --mem=1G --wrap {})",
-                kind(stage.kind),
-                stage.tasks().len(),
+                stage.does,
+                stage.range().len(),
                 self.threads,
                 single_quoted(&work),
                 single_quoted(&self.command("gather")),
@@ -123,11 +114,11 @@ impl Script<'_> {
         let mut text = self.head();
         text += "# PARALLEL_OPTIONS may hold more options of parallel, such as '--jobs 4' or '--sshloginfile hosts'.\n";
         for (number, stage) in self.stages() {
-            let tasks = stage.tasks();
+            let tasks = stage.range();
             let _ = writeln!(
                 text,
                 "# Stage {number}: {}.\nseq {} {} | parallel ${{PARALLEL_OPTIONS:-}} --retries 3 {} || :\n{}",
-                kind(stage.kind),
+                stage.does,
                 tasks.start,
                 tasks.end - 1,
                 single_quoted(&self.work("{}")),
@@ -168,7 +159,7 @@ impl Script<'_> {
             self.command("resume"),
         );
         for (number, stage) in self.stages() {
-            let tasks = stage.tasks();
+            let tasks = stage.range();
             let before = match number == self.planned.stage + 1 {
                 true => String::new(),
                 false => format!("    input: {}\n", flag(format!("stage-{}", number - 1))),
@@ -176,7 +167,7 @@ impl Script<'_> {
             let _ = writeln!(
                 text,
                 "# {}.\nrule work_{number}:\n{before}    output: touch({})\n    threads: {}\n    resources: mem_mb={}\n    retries: 3\n    shell: {:?}\n",
-                kind(stage.kind),
+                stage.does,
                 flag(format!("task-{number}-{{task}}")),
                 self.threads,
                 (self.memory_bytes + MEMORY_BESIDE) >> 20,
@@ -199,11 +190,11 @@ impl Script<'_> {
     pub fn list(&self) -> String {
         let mut text = String::new();
         for (number, stage) in self.stages() {
-            let tasks = stage.tasks();
+            let tasks = stage.range();
             let _ = writeln!(
                 text,
                 "stage {number} ({}), in any order and at once, K from {} to {}:\n  {}\nthen:\n  {}",
-                kind(stage.kind),
+                stage.does,
                 tasks.start,
                 tasks.end - 1,
                 self.work("K"),

@@ -9,12 +9,9 @@ use serde_json::{Value, json};
 use super::args::{GatherArgs, PlanArgs, WorkArgs};
 use super::console::Console;
 use super::failure::Failure;
-use super::task_scripts::{Script, kind};
+use super::task_scripts::Script;
 use super::{memory, threads};
-use tetdb_engine::api::tasks::ranges;
-use tetdb_engine::api::{Error, Tasks};
-use tetdb_engine::pipeline::{Planned, TaskState};
-use tetdb_io::write::{ExportSelection, check};
+use tetdb_engine::api::{ExportOptions, TaskStage, TaskStatus, Tasks, task_ranges};
 
 /// Sub-domains a task of the last stage should have, so that tasks end at about the same time.
 const SUBDOMAINS_PER_TASK: u32 = 4;
@@ -24,8 +21,7 @@ const MEMORY_PER_TASK: u64 = 4 << 30;
 pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
     let memory_bytes = memory::asked(args.memory_per_task.as_deref())?.unwrap_or(MEMORY_PER_TASK);
     if let Some(out) = &args.export {
-        let pieces = ExportSelection { pieces: true, ..ExportSelection::default() };
-        check(out, &pieces).map_err(Error::from)?;
+        ExportOptions::new().pieces().check(out)?;
     }
     let tasks = Tasks::of(&args.store).settings(console.settings(None, None));
     tasks.plan(args.tasks)?;
@@ -103,69 +99,48 @@ pub fn gather(args: &GatherArgs, console: &Console) -> Result<u8, Failure> {
         .wait(Duration::from_secs(args.wait));
     let gathered = tasks.gather_reported()?;
     console.done();
-    let next: Vec<u32> = gathered.left.iter().map(|(task, _)| *task).collect();
     if console.is_json() {
-        console.answer(&json!({
-            "schema": 1, "committed": gathered.committed, "next": next, "stage": gathered.stage[0],
-            "stages": gathered.stage[1], "finished": gathered.is_finished,
-        }));
-    } else if gathered.is_finished {
+        let mut answer = json!(gathered);
+        answer["schema"] = json!(1);
+        console.answer(&answer);
+    } else if gathered.finished {
         console.line(&format!("{} is finished", args.store.display()));
         console.note(&format!("next: `tetdb resume {}` verifies it", args.store.display()));
     } else {
         console.line(&format!(
             "stage {} of {}: tasks {} can begin",
-            gathered.stage[0] + 1,
-            gathered.stage[1],
-            ranges(next)
+            gathered.stage + 1,
+            gathered.stages,
+            task_ranges(gathered.next)
         ));
     }
     Ok(0)
 }
 
 /// The tasks of a store for `info`.
-pub(super) fn object(planned: &Planned) -> Value {
-    let [done, running, failed, waiting] = planned.counts();
-    let states: Vec<Value> =
-        (planned.states.iter()).map(|(task, state)| state_object(*task, state)).collect();
-    let stages: Vec<Value> = (planned.stages.iter())
-        .map(|s| json!({ "does": kind(s.kind), "first_task": s.first, "tasks": s.tasks().len() }))
-        .collect();
-    json!({
-        "subdomains": planned.subdomains, "tasks": planned.tasks, "stage": planned.stage, "stages": stages,
-        "done": done, "running": running, "failed": failed, "waiting": waiting,
-        "task_mean_s": planned.seconds_mean(), "states": states,
-    })
-}
-
-fn state_object(task: u32, state: &TaskState) -> Value {
-    let (word, host, why, seconds) = match state {
-        TaskState::Waiting => ("waiting", None, None, None),
-        TaskState::Running { host } => ("running", Some(host), None, None),
-        TaskState::Failed { why } => ("failed", None, Some(why), None),
-        TaskState::Done { seconds } => ("done", None, None, Some(seconds)),
-    };
-    json!({ "task": task, "state": word, "host": host, "why": why, "wall_s": seconds })
+pub(super) fn object(status: &TaskStatus) -> Value {
+    json!(status)
 }
 
 /// The same for people.
-pub(super) fn print(planned: &Planned, console: &Console) {
-    let [done, running, failed, waiting] = planned.counts();
-    let range = planned.range();
-    let what = planned.stages.get(planned.stage).map_or("", |s| kind(s.kind));
+pub(super) fn print(status: &TaskStatus, console: &Console) {
+    let TaskStatus { done, running, failed, waiting, stage, stages, .. } = status;
+    let current = stages.get(*stage);
+    let range = current.map_or(0..0, TaskStage::range);
+    let does = current.map_or("", |stage| stage.does);
     console.line(&format!(
-        "tasks {}-{} of stage {} of {} ({what}): {done} done, {running} running, {failed} failed, {waiting} waiting",
+        "tasks {}-{} of stage {} of {} ({does}): {done} done, {running} running, {failed} failed, {waiting} waiting",
         range.start,
         range.end.saturating_sub(1),
-        planned.stage + 1,
-        planned.stages.len(),
+        stage + 1,
+        stages.len(),
     ));
-    for (task, state) in &planned.states {
-        if let TaskState::Failed { why } = state {
-            console.line(&format!("  task {task} has to be done again: {why}"));
+    for report in &status.states {
+        if let Some(why) = &report.why {
+            console.line(&format!("  task {} has to be done again: {why}", report.task));
         }
     }
-    if let Some(mean) = planned.seconds_mean() {
+    if let Some(mean) = status.task_mean_s {
         let left = (running + failed + waiting) as f64 * mean;
         console.line(&format!(
             "{mean:.0} s a task so far: {left:.0} s of work are left in this stage, shared by the tasks that run at once"

@@ -46,7 +46,7 @@ pub(super) fn settings(args: &VerifyArgs, console: &Console) -> Result<Settings,
     let mut settings = console.settings(Some(cap), threads::asked(args.threads)?);
     #[cfg(feature = "mpi")]
     {
-        settings.hands = super::ranks::hands();
+        settings = super::ranks::share_work(settings);
     }
     Ok(settings)
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::run::ReadArgs;
 use super::surface::SheetArgs;
-use tetdb_io::write::Share;
+use tetdb_engine::api::Share;
 
 #[derive(Debug, clap::Args)]
 pub struct StoreArgs {

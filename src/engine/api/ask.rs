@@ -1,17 +1,18 @@
 //! Questions about tetrahedra.
 
 use super::guard::guarded_in;
-use super::{Error, Store};
-use tetdb_base::expr::{ExprError, ExprKind, Expression};
+use super::{Condition, Error, Store, VARIABLES};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::RunContext;
 use tetdb_schema::code::Code;
-use tetdb_store::query::{
-    Hit, Ordered, QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called,
-};
+pub use tetdb_schema::ids::{TetId, VertexId};
+pub use tetdb_store::query::Measures as ChunkCounts;
+use tetdb_store::query::{Hit, Ordered, QueryError, QuerySession, Selection, Solid};
 
-/// Memory of answers while they are sorted.
-const SORT_BYTES: u64 = 32 << 20;
+/// Share of the memory cap for answers that are sorted; the session holds three quarters of the cap.
+const SORTED_SHARE: u64 = 8;
+/// The place of quality among the [`VARIABLES`].
+const QUALITY: usize = 0;
 
 /// Which answers come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,14 +49,21 @@ pub struct Query<'s> {
 /// Answers as they are found. After an error there are no more.
 pub struct Answers<'s> {
     context: RunContext,
-    found: Option<Box<dyn Iterator<Item = Result<Hit, QueryError>> + 's>>,
+    found: Option<Hits<'s>>,
     left: usize,
 }
+
+type Hits<'s> = Box<dyn Iterator<Item = Result<Hit, QueryError>> + 's>;
 
 impl Store {
     /// Begins a question about tetrahedra.
     pub fn query(&mut self) -> Query<'_> {
         Query::new(self)
+    }
+
+    /// Counts the chunks that all questions so far have read, and those that there are. Errors: as [`Query::answers`].
+    pub fn chunk_counts(&mut self) -> Result<ChunkCounts, Error> {
+        self.with_session(|session| Ok(session.measures()))
     }
 }
 
@@ -105,7 +113,7 @@ impl<'s> Query<'s> {
 
     /// They are in a region of this name. Errors: `no-such-part`.
     pub fn in_region_called(mut self, name: &str) -> Result<Self, Error> {
-        let found = regions_called(&self.store.summary().region_names, name)?;
+        let found = self.store.summary().regions_called(name)?;
         self.selection.regions.get_or_insert_default().extend(found);
         Ok(self)
     }
@@ -139,9 +147,42 @@ impl<'s> Query<'s> {
     /// such as `quality > 6 and region in [1, 2]`.
     ///
     /// Errors: `bad-expression`, with the place.
-    pub fn where_(mut self, condition: &str) -> Result<Self, Error> {
-        self.selection.condition = Some(condition_of(condition)?);
+    pub fn where_(self, condition: &str) -> Result<Self, Error> {
+        Ok(self.condition(Condition::parse_located(condition)?))
+    }
+
+    /// The condition holds of them; see [`Query::where_`].
+    pub fn condition(mut self, condition: Condition) -> Self {
+        self.selection.condition = Some(condition.0);
+        self
+    }
+
+    /// They are among these.
+    pub fn among(mut self, tets: &[TetId]) -> Self {
+        self.selection.tets = Some(tets.to_vec());
+        self
+    }
+
+    /// They share a face with this tetrahedron. Replaces any other neighborhood. Errors: `no-such-part`; damage.
+    pub fn next_to(mut self, tet: TetId) -> Result<Self, Error> {
+        self.selection.sharing =
+            Some(self.store.with_session(|session| Ok(session.next_to(tet)?))?);
         Ok(self)
+    }
+
+    /// They have all these vertices: the ball of one, the shell of an edge. Replaces any other neighborhood.
+    ///
+    /// Errors: `no-such-part`; damage.
+    pub fn around(mut self, vertices: &[VertexId]) -> Result<Self, Error> {
+        self.selection.sharing =
+            Some(self.store.with_session(|session| Ok(session.around(vertices)?))?);
+        Ok(self)
+    }
+
+    /// Measures [`Hit::excess`] of the answers, which reads the faces on the surface.
+    pub fn with_excess(mut self) -> Self {
+        self.selection.excess = true;
+        self
     }
 
     /// Sorts the answers by one of the numbers a condition may name. Errors: `bad-query`.
@@ -163,10 +204,14 @@ impl<'s> Query<'s> {
 
     /// The answers, found while they are taken. Errors: damage; too little memory.
     pub fn answers(self) -> Result<Answers<'s>, Error> {
+        let memory = self.store.settings().cap()? / SORTED_SHARE;
         let Self { store, selection, order, limit } = self;
         let (context, session) = store.context_and_session()?;
         let context = context.clone();
-        let found = guarded_in(&context, || found(session, selection, order))?;
+        let found = guarded_in(&context, || match order {
+            None => Ok(Box::new(session.select(selection)?) as Hits),
+            Some(order) => sorted(session, selection, order, (limit, memory)),
+        })?;
         Ok(Answers { context, found: Some(found), left: limit.unwrap_or(usize::MAX) })
     }
 
@@ -176,19 +221,23 @@ impl<'s> Query<'s> {
     }
 }
 
-fn found<'s>(
+/// Sorts what is selected. A few of the best or worst quality are found without a look at all chunks.
+fn sorted<'s>(
     session: &'s mut QuerySession,
     selection: Selection,
-    order: Option<(usize, Order)>,
-) -> Result<Box<dyn Iterator<Item = Result<Hit, QueryError>> + 's>, Error> {
+    (variable, order): (usize, Order),
+    (limit, memory): (Option<usize>, u64),
+) -> Result<Hits<'s>, Error> {
+    let falls = order == Order::Falling;
+    let few = limit.filter(|n| n.saturating_mul(2 * size_of::<Hit>()) as u64 <= memory);
+    if let Some(n) = few
+        && variable == QUALITY
+        && session.has_extremes(&selection)
+    {
+        return Ok(Box::new(session.extreme(&selection, falls, n)?.into_iter().map(Ok)));
+    }
     let selected = session.select(selection)?;
-    Ok(match order {
-        None => Box::new(selected),
-        Some((variable, order)) => {
-            let falls = order == Order::Falling;
-            Box::new(Ordered::new(selected, variable, falls, &std::env::temp_dir(), SORT_BYTES)?)
-        }
-    })
+    Ok(Box::new(Ordered::new(selected, variable, falls, &std::env::temp_dir(), memory)?))
 }
 
 impl Iterator for Answers<'_> {
@@ -203,17 +252,4 @@ impl Iterator for Answers<'_> {
         }
         next
     }
-}
-
-pub(super) fn condition_of(text: &str) -> Result<Expression, Error> {
-    let wrong = |error: ExprError| {
-        Error::new(Code::BadExpression, &error)
-            .at(format!("character {} of {text}", error.at + 1))
-            .with_help("such as quality > 6 and region in [1, 2]")
-    };
-    let condition = Expression::parse(text, &VARIABLES).map_err(wrong)?;
-    if condition.kind() == ExprKind::Truth {
-        return Ok(condition);
-    }
-    Err(wrong(ExprError { at: 0, message: "this is a number; a condition compares".to_owned() }))
 }

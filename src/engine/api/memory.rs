@@ -9,6 +9,9 @@ const DEFAULT_SHARE: f64 = 0.6;
 /// What is assumed where the system does not say.
 const UNKNOWN_FREE: u64 = 4 << 30;
 
+/// The smallest cap of any run.
+pub const MEMORY_LEAST: Bytes = Bytes(MEMORY_MIN);
+
 /// A number of bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Bytes(

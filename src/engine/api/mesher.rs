@@ -61,12 +61,37 @@ pub struct Mesher {
 }
 
 /// What a run left at its path.
-#[doc(hidden)]
+#[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Created {
+    /// Path of the store.
     pub path: PathBuf,
-    /// `None` where the finished mesh of this job was there already.
-    pub summary: Option<pipeline::Summary>,
+    /// Whether the finished mesh of this job was there already.
     pub was_there: bool,
+    /// Pages that the run moved; `None` where nothing was meshed.
+    pub traffic: Option<Traffic>,
+}
+
+/// Pages of the working mesh that a run moved between memory and disk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Traffic {
+    /// Pages read.
+    pub pages_read: u64,
+    /// Pages written.
+    pub pages_written: u64,
+    /// Most pages held in memory at once.
+    pub frames_used: usize,
+}
+
+impl From<&pipeline::Summary> for Traffic {
+    fn from(summary: &pipeline::Summary) -> Self {
+        Self {
+            pages_read: summary.pages.pages_read,
+            pages_written: summary.pages.pages_written,
+            frames_used: summary.frames_used,
+        }
+    }
 }
 
 impl Mesher {
@@ -75,7 +100,7 @@ impl Mesher {
         Self::with_options(surface, MeshOptions::default())
     }
 
-    #[doc(hidden)]
+    /// With these options, and default settings.
     pub fn with_options(surface: Surface, mesh: MeshOptions) -> Self {
         Self {
             surface,
@@ -269,7 +294,6 @@ impl Mesher {
     }
 
     /// [`Mesher::create`], and what the run did.
-    #[doc(hidden)]
     pub fn create_reported(mut self, path: &Path) -> Result<Created, Error> {
         let settings = self.settings.clone();
         guarded(&settings, || self.run(path, &settings))
@@ -288,7 +312,7 @@ impl Mesher {
             self.divide_surface(path, cap, settings)?;
         }
         if self.is_there(path)? {
-            return Ok(Created { path: path.to_owned(), summary: None, was_there: true });
+            return Ok(Created { path: path.to_owned(), was_there: true, traffic: None });
         }
         if self.preflight {
             preflight::surface_fits(&self.surface.inner, cap)?;
@@ -297,7 +321,7 @@ impl Mesher {
         let (summary, lock) = match self.mesh(path, cap, prepared, settings) {
             // Another run was faster: what it left decides.
             Err(error) if error.code() == Code::StoreExists && self.is_there(path)? => {
-                return Ok(Created { path: path.to_owned(), summary: None, was_there: true });
+                return Ok(Created { path: path.to_owned(), was_there: true, traffic: None });
             }
             other => other?,
         };
@@ -309,7 +333,7 @@ impl Mesher {
             };
             verify_new(path, surface, cap, settings, lock)?;
         }
-        Ok(Created { path: path.to_owned(), summary: Some(summary), was_there: false })
+        Ok(Created { path: path.to_owned(), was_there: false, traffic: Some((&summary).into()) })
     }
 
     /// Refuses early what is no store or an unfinished one, before a surface is read for it.

@@ -6,9 +6,11 @@
 //! `error`. Private: `job` (what is put on record), `preflight` (what is refused before it begins), `replace` (one store in the place of
 //! another), `guard` (nothing unwinds into the caller).
 
+mod answer_file;
+mod answer_rows;
 mod ask;
-
 mod compare;
+mod condition;
 mod defects;
 #[doc(hidden)]
 pub mod error;
@@ -23,22 +25,23 @@ pub mod job;
 mod located;
 mod memory;
 mod mesher;
+#[cfg(feature = "mpi")]
+pub mod mpi;
+mod names;
 mod options;
 #[doc(hidden)]
 pub mod page;
-#[doc(hidden)]
-pub mod picture;
+mod picture;
 mod prediction;
 #[doc(hidden)]
 pub mod preflight;
-#[doc(hidden)]
-pub mod remesh;
+mod remesh;
+mod remesh_sizes;
 #[doc(hidden)]
 pub mod replace;
 mod resume;
 mod settings;
-#[doc(hidden)]
-pub mod show;
+mod show;
 mod sizes;
 #[doc(hidden)]
 pub mod store;
@@ -52,58 +55,63 @@ mod surface_report;
 mod surface_wires;
 #[doc(hidden)]
 pub mod targets;
-#[doc(hidden)]
-pub mod tasks;
+mod tasks;
+mod tasks_status;
 #[doc(hidden)]
 pub mod verify;
-#[doc(hidden)]
-pub mod verify_server;
+#[cfg(any(test, feature = "mpi"))]
+mod verify_server;
 mod verify_shared;
 
 pub use crate::pipeline::{MeshOptions, OptionsText};
-pub use ask::{Answers, Order, Query};
+pub use crate::view::Excess;
+pub use answer_file::AnswerFile;
+pub use answer_rows::{AnswerColumn, AnswerRow, AnswerValue, csv_head};
+pub use ask::{Answers, ChunkCounts, Order, Query, TetId, VertexId};
 pub use compare::Comparison;
+pub use condition::{Condition, ExprError, VARIABLES};
 pub use defects::DefectPlace;
 pub use error::Error;
 #[doc(hidden)]
 pub use guard::guarded;
 pub use info::{EmbeddedInfo, RegionInfo, StageInfo, StoreInfo, SubdomainInfo};
-pub use memory::Bytes;
 #[doc(hidden)]
 pub use memory::default_cap;
 pub use memory::peak_bytes;
 #[doc(hidden)]
 pub use memory::show_bytes;
-pub use mesher::{Existing, Mesher};
+pub use memory::{Bytes, MEMORY_LEAST};
+pub use mesher::{Created, Existing, Mesher, Traffic};
 #[doc(hidden)]
 pub use mesher::{divide, predict};
 pub use options::{Length, Optimize, Regions, Seal, Subdomains, typed};
+pub use page::{Reported, ShownTriangles};
 pub use picture::{ColorBy, Snapped, Snapshot};
 pub use prediction::{Prediction, WorkersPrediction};
-pub use remesh::{Remesh, Remeshed};
+pub use remesh::{Remesh, RemeshForecast, Remeshed};
 #[doc(hidden)]
 pub use resume::resume_reported;
 pub use settings::{Event, Settings};
-pub use show::{ExportOptions, Exported};
+pub use show::{ExportOptions, Exported, MESH_ENDINGS, MeshFormat, Share, Writers};
 pub use sizes::Sizes;
 pub use store::{Store, Summary};
 pub use suggestions::Suggestion;
 pub use surface::{CheckReport, Surface};
 pub use surface_repair::{RepairReport, WELD_SHARE_MAX};
 pub use surface_report::SurfaceReport;
+pub use targets::{check_target, inputs_of};
 pub use tasks::Tasks;
-#[doc(hidden)]
+pub use tasks_status::{GatherReport, TaskReport, TaskStage, TaskStatus, task_ranges};
 pub use tetdb_base::geom::short;
 pub use tetdb_base::storage::CancelToken;
-#[doc(hidden)]
 pub use tetdb_base::surface::show as show_point;
 pub use tetdb_base::surface::{Defect, SplitReport};
 pub use tetdb_base::surface::{Seed, SeedKind};
 pub use tetdb_io::read::WireKind as EmbeddedKind;
-pub use tetdb_io::write::MeshFormat;
 pub use tetdb_io::write::SurfaceReport as SurfaceWritten;
 pub use tetdb_kernel::samples::PREFIX as SAMPLE_PREFIX;
 pub use tetdb_kernel::sizing::SizeWarning;
+pub use tetdb_schema::catalog::{QualityRow, StoreState};
 pub use tetdb_schema::code::Code;
 pub use tetdb_schema::word::Word;
 pub use tetdb_store::audit::{Population, Qualities};

@@ -4,18 +4,19 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use tetdb_schema::code::Code;
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
-use super::{Error, Settings, Store, guarded};
+use super::{ChunkCounts, Error, Settings, Store, guarded};
 
 use crate::view;
 use crate::view::page::{self, Page, Surface};
 use crate::view::{Cross, Excess, Patch, SceneCut, Statistics};
 use tetdb_base::storage::{Budget, attempt};
 use tetdb_schema::catalog::{JournalRow, QUALITY_BINS};
-use tetdb_store::query::{Measures, QuerySession};
+use tetdb_store::query::QuerySession;
 use tetdb_store::store::Catalog;
 
 /// Qualities from here on have the last color, as in pictures.
@@ -23,31 +24,50 @@ const QUALITY_MOST: f32 = 3.0;
 /// Regions whose labels are named.
 const LABELS_NAMED: usize = 24;
 
-/// What was written.
-#[derive(Clone, Debug)]
-#[doc(hidden)]
-pub struct Written {
+/// A page that was written.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
+pub struct Reported {
+    /// Length of the file.
     pub bytes: u64,
-    /// Triangles of each surface, and those shown.
-    pub scene: Value,
-    pub measures: Measures,
+    /// Triangles on the boundary.
+    pub boundary: ShownTriangles,
+    /// Triangles between sub-domains.
+    pub interfaces: ShownTriangles,
+    /// Chunks that were read for the page.
+    pub chunks: ChunkCounts,
+}
+
+/// How much of a surface a page shows: large surfaces are coarsened.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ShownTriangles {
+    /// Triangles of the surface.
+    pub of: u64,
+    /// Triangles in the page.
+    pub shown: u64,
+}
+
+impl ShownTriangles {
+    fn from_scene(scene: &Value, name: &str) -> Self {
+        let count = |key: &str| scene[name][key].as_u64().unwrap_or_default();
+        Self { of: count("of"), shown: count("shown") }
+    }
 }
 
 impl Store {
     /// Writes a page about the mesh, to be opened in a browser: numbers, charts, surfaces to be turned, cuts. `.html`.
     ///
-    /// Returns the length of the file. Errors: `unknown-format`; damage; the disk.
-    pub fn report(&self, out: impl AsRef<Path>) -> Result<u64, Error> {
+    /// Errors: `unknown-format`; damage; the disk.
+    pub fn report(&self, out: impl AsRef<Path>) -> Result<Reported, Error> {
         guarded(self.settings(), || {
             check_target(out.as_ref(), &inputs_of(self.path()))?;
-            Ok(write_page(self.path(), out.as_ref(), self.settings())?.bytes)
+            write_page(self.path(), out.as_ref(), self.settings())
         })
     }
 }
 
 /// Writes a page about the store at `path`.
-#[doc(hidden)]
-pub fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result<Written, Error> {
+fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result<Reported, Error> {
     if !page::is_page(out) {
         let what = "a report is a page for a browser, and its name must say so";
         let error = Error::new(Code::UnknownFormat, what).at(out.display());
@@ -60,7 +80,7 @@ pub fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result<Writte
     // Text and tables of the page have the rest.
     let (mut session, budget) =
         (QuerySession::open(store, &Budget::new(cap / 2))?, Budget::new(cap / 8 * 3));
-    attempt(|| -> Result<Written, Error> {
+    attempt(|| -> Result<Reported, Error> {
         let statistics = view::statistics(&mut session, &budget, &|done, total| {
             settings.count("measure", done, total, "tetrahedra");
         })?;
@@ -70,23 +90,30 @@ pub fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result<Writte
                 settings.count("cut", done, total, "cuts")
             })?;
         data["statistics"] = json!(statistics);
-        Ok(Written {
+        Ok(Reported {
             bytes: page.finish(&data)?,
-            scene: data["scene"].take(),
-            measures: session.measures(),
+            boundary: ShownTriangles::from_scene(&data["scene"], "boundary"),
+            interfaces: ShownTriangles::from_scene(&data["scene"], "interfaces"),
+            chunks: session.measures(),
         })
     })?
 }
 
-/// Quality over the least that the surface allows, of all tetrahedra of the store at `path`.
-#[doc(hidden)]
-pub fn measure_excess(path: &Path, settings: &Settings) -> Result<Excess, Error> {
-    let cap = settings.cap()?;
-    let mut session = QuerySession::open(open_finished(path)?, &Budget::new(cap / 2))?;
-    attempt(|| -> Result<Excess, Error> {
-        let tell = |done, total| settings.count("measure", done, total, "tetrahedra");
-        Ok(view::statistics(&mut session, &Budget::new(cap / 8 * 3), &tell)?.excess)
-    })?
+impl Store {
+    /// Quality of all tetrahedra over the least that the surface allows. Reads the whole mesh.
+    ///
+    /// # Errors
+    /// Damage; too little memory.
+    pub fn excess(&self) -> Result<Excess, Error> {
+        let settings = self.settings();
+        guarded(settings, || {
+            let cap = settings.cap()?;
+            let open = open_finished(self.path())?;
+            let mut session = QuerySession::open(open, &Budget::new(cap / 2))?;
+            let report = |done, total| settings.count("measure", done, total, "tetrahedra");
+            Ok(view::statistics(&mut session, &Budget::new(cap / 8 * 3), &report)?.excess)
+        })
+    }
 }
 
 /// What the catalog has on record.

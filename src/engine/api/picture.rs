@@ -4,18 +4,16 @@ use std::path::Path;
 use tetdb_schema::code::Code;
 use tetdb_schema::word::Word;
 
-use super::ask::condition_of;
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
-use super::{Error, Settings, Store, guarded};
+use super::{ChunkCounts, Condition, Error, Settings, Store, guarded};
 use crate::view;
 use crate::view::picture::{ColorBar, Picture, PictureFrame, Rgb, category, scale};
 use crate::view::{Clip, Extent, Piece, Section, ShellView, View};
-use tetdb_base::expr::Expression;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Budget, attempt};
 use tetdb_schema::catalog::Stage;
-use tetdb_store::query::{Measures, QuerySession, Selection};
+use tetdb_store::query::{QuerySession, Selection};
 
 /// Qualities from here on have the last color: few are worse, and the others should differ.
 const QUALITY_MOST: f32 = 3.0;
@@ -70,12 +68,12 @@ pub struct Snapshot {
     from: Option<Point>,
     color: ColorBy,
     pixels: [u32; 2],
-    condition: Option<Expression>,
+    condition: Option<Condition>,
     crinkle: bool,
 }
 
 /// A picture that was taken.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct Snapped {
     /// Length of the file.
@@ -87,8 +85,7 @@ pub struct Snapped {
     /// Least and greatest mean edge length.
     pub size: [f32; 2],
     /// What was read for it.
-    #[doc(hidden)]
-    pub measures: Measures,
+    pub chunks: ChunkCounts,
 }
 
 impl Snapshot {
@@ -162,11 +159,11 @@ impl Snapshot {
 
     /// Only tetrahedra that a condition holds of; see [`Query::where_`](super::Query::where_). Errors: `bad-expression`.
     pub fn where_(self, condition: &str) -> Result<Self, Error> {
-        Ok(self.with_condition(condition_of(condition)?))
+        Ok(self.condition(Condition::parse_located(condition)?))
     }
 
-    #[doc(hidden)]
-    pub fn with_condition(mut self, condition: Expression) -> Self {
+    /// Only tetrahedra that the condition holds of; see [`Snapshot::where_`].
+    pub fn condition(mut self, condition: Condition) -> Self {
         self.condition = Some(condition);
         self
     }
@@ -178,8 +175,7 @@ impl Snapshot {
     }
 
     /// Errors: what has no meaning together.
-    #[doc(hidden)]
-    pub fn check(&self) -> Result<(), Error> {
+    fn check(&self) -> Result<(), Error> {
         let bad = |message: &str| Err(Error::new(Code::BadQuery, message));
         let in_space = matches!(self.subject, Subject::Surface(_));
         if self.from.is_some() && !in_space {
@@ -216,8 +212,7 @@ impl Store {
 }
 
 /// Takes a picture of the store at `path`.
-#[doc(hidden)]
-pub fn take(
+fn take(
     path: &Path,
     out: &Path,
     snapshot: &Snapshot,
@@ -270,7 +265,7 @@ impl Snapshot {
             pieces: extent.n,
             quality: extent.quality,
             size: extent.size,
-            measures: session.measures(),
+            chunks: session.measures(),
         })
     }
 }
@@ -311,7 +306,8 @@ fn pieces(
         None => [middle, thinnest(&bounds)],
     });
     let view = View::new(point, normal);
-    let selection = Selection { condition: snapshot.condition.clone(), ..Selection::default() };
+    let condition = snapshot.condition.clone().map(|condition| condition.0);
+    let selection = Selection { condition, ..Selection::default() };
     let section = view::section(session, &view, snapshot.crinkle, selection, dir, memory)?;
     Ok((section, view))
 }

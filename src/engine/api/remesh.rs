@@ -1,21 +1,16 @@
 //! Sub-domains of a finished store meshed again; what lies around them stays as it is.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tetdb_schema::code::Code;
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
-use super::mesher::predict;
 use super::preflight::scratch_beside;
+use super::remesh_sizes::{Lengths, RemeshSizes};
 use super::store::{open_finished, open_to_change};
 use super::{Error, Settings, Sizes, Store, Surface, guarded, job, verify};
-use crate::pipeline::{
-    self, MeshOptions, NewSizes, Options, OptionsText, RECIPE, ResaturateSummary, Resaturation,
-    SizeFile, Values,
-};
-use tetdb_kernel::sizing::{SizeField, SizeOptions};
+use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Values};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_store::audit::Level;
 use tetdb_store::store::{Catalog, StoreError, WriterLock};
@@ -38,23 +33,46 @@ use tetdb_store::store::{Catalog, StoreError, WriterLock};
 pub struct Remesh {
     path: PathBuf,
     settings: Settings,
-    ranks: BTreeSet<u32>,
-    sizes: Option<Sizes>,
-    lengths: Option<Values>,
-    factor: f64,
-    prepared: Option<NewSizes>,
+    ranks: RemeshRanks,
+    sizes: RemeshSizes,
     repair: bool,
     verify: bool,
-    /// `None`: it is taken when the run begins.
-    lock: Option<Arc<WriterLock>>,
+}
+
+/// Sub-domains to be meshed again.
+#[derive(Clone, Debug)]
+enum RemeshRanks {
+    Listed(BTreeSet<u32>),
+    /// Those whose lengths would differ.
+    Changed,
 }
 
 /// What was meshed again.
+#[non_exhaustive]
 pub struct Remeshed {
     /// The store as it is now.
     pub store: Store,
     /// Each sub-domain before and after, by rank.
     pub subdomains: Vec<[SubdomainRow; 2]>,
+    /// Vertices inserted into each of them, parallel to `subdomains`; `None` where an older version came back.
+    pub inserted_vertices: Vec<Option<u64>>,
+    /// Pages read from scratch files.
+    pub pages_read: u64,
+    /// Pages written to scratch files.
+    pub pages_written: u64,
+    /// Most pages held in memory at once.
+    pub frames_used: usize,
+}
+
+/// A sub-domain that [`Remesh::run`] would mesh again.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RemeshForecast {
+    /// Rank of the sub-domain.
+    pub id: u32,
+    /// Tetrahedra it has now.
+    pub tets: u64,
+    /// Tetrahedra to expect.
+    pub predicted_tets: f64,
 }
 
 impl Store {
@@ -66,13 +84,23 @@ impl Store {
 
     /// Brings back what the last [`Store::remesh`] replaced. Errors: `nothing-to-undo`.
     pub fn undo(self) -> Result<Self, Error> {
+        Ok(self.undo_reported(false)?.store)
+    }
+
+    /// [`Store::undo`], with what came back; the mesh is also verified if `verify` is true. Errors: as there; `invalid-mesh`.
+    pub fn undo_reported(self, verify: bool) -> Result<Remeshed, Error> {
         let (path, settings) = self.into_parts();
-        guarded(&settings, || {
+        let summary = guarded(&settings, || {
             let mut catalog = open_to_change(&path, &settings)?;
-            pipeline::undo(&mut catalog)?;
-            Ok(catalog.close()?)
+            let lock = catalog.lock();
+            let summary = pipeline::undo(&mut catalog)?;
+            catalog.close()?;
+            if let (true, Some(lock)) = (verify, lock) {
+                verify_changed(&path, &settings, lock)?;
+            }
+            Ok(summary)
         })?;
-        Self::open_with(path, settings)
+        Remeshed::new(Self::open_with(path, settings)?, summary)
     }
 
     /// Drops what the last [`Store::remesh`] replaced, which cannot be undone then. Returns the number of sub-domains.
@@ -88,49 +116,58 @@ impl Store {
 }
 
 impl Remesh {
-    #[doc(hidden)]
-    pub fn new(path: PathBuf, settings: Settings) -> Self {
+    /// Of the store at `path`, which is opened when the run begins.
+    pub fn new(path: impl AsRef<Path>, settings: Settings) -> Self {
         Self {
-            path,
+            path: path.as_ref().to_owned(),
             settings,
-            ranks: BTreeSet::new(),
-            sizes: None,
-            lengths: None,
-            factor: 1.0,
-            prepared: None,
+            ranks: RemeshRanks::Listed(BTreeSet::new()),
+            sizes: RemeshSizes::default(),
             repair: false,
             verify: true,
-            lock: None,
         }
     }
 
     /// Which sub-domains, by rank.
     pub fn subdomains(mut self, ranks: &[u32]) -> Self {
-        self.ranks = ranks.iter().copied().collect();
+        self.ranks = RemeshRanks::Listed(ranks.iter().copied().collect());
         self
     }
 
-    /// With these sizes beside those on record: single lengths replace them, shapes and regions are added.
+    /// The sub-domains whose lengths would differ by 5 % somewhere.
+    pub fn changed(mut self) -> Self {
+        self.ranks = RemeshRanks::Changed;
+        self
+    }
+
+    /// With these sizes beside those on record: single lengths replace them, shapes and regions are added. Of lengths one by
+    /// one they are the limits and the gradation.
     pub fn sizes(mut self, sizes: Sizes) -> Self {
-        self.sizes = Some(sizes);
+        self.sizes.sizes = Some(sizes);
         self
     }
 
     /// With one length for each tetrahedron of the sub-domains, by rank, in the order in which they are read.
     pub fn lengths_of_tets(mut self, lengths: Vec<f64>) -> Self {
-        self.lengths = Some(Values::Tets(lengths));
+        self.sizes.lengths = Some(Lengths::Given(Values::Tets(lengths)));
         self
     }
 
     /// With one length for each vertex of the only sub-domain, in the order in which they are read.
     pub fn lengths_of_vertices(mut self, lengths: Vec<f64>) -> Self {
-        self.lengths = Some(Values::Vertices(lengths));
+        self.sizes.lengths = Some(Lengths::Given(Values::Vertices(lengths)));
+        self
+    }
+
+    /// With the lengths of a `.npy` file, for the tetrahedra or the vertices of the sub-domains: their number decides.
+    pub fn lengths_from(mut self, file: impl AsRef<Path>) -> Self {
+        self.sizes.lengths = Some(Lengths::File(file.as_ref().to_owned()));
         self
     }
 
     /// All lengths times `factor`: 0.5 gives edges half as long.
     pub fn scaled(mut self, factor: f64) -> Self {
-        self.factor = factor;
+        self.sizes.factor = Some(factor);
         self
     }
 
@@ -146,172 +183,96 @@ impl Remesh {
         self
     }
 
-    /// By a caller in this crate who has the lock of the store.
-    #[doc(hidden)]
-    pub fn locked(mut self, lock: Option<Arc<WriterLock>>) -> Self {
-        self.lock = lock;
-        self
-    }
-
-    /// With sizes that a caller in this crate has prepared.
-    #[doc(hidden)]
-    pub fn prepared_sizes(mut self, sizes: Option<NewSizes>) -> Self {
-        self.prepared = sizes;
-        self
-    }
-
-    /// Meshes them again in one step, verifies, and opens the store. The result depends on store and sizes alone.
+    /// Meshes them again in one step, verifies, and opens the store. The result depends on store and sizes alone. Without any sub-domain
+    /// the store stays as it is.
     ///
     /// Errors: `no-such-part`, `no-coarse-leaf`; sizes that make no sense; `store-recipe` where a repair is to give what another recipe
     /// gave. The store is then as it was.
     pub fn run(self) -> Result<Remeshed, Error> {
-        let (path, settings) = (self.path.clone(), self.settings.clone());
-        let parts = self.run_reported()?.parts.into_iter();
-        Ok(Remeshed {
-            store: Store::open_with(path, settings)?,
-            subdomains: parts.map(|part| [part.before, part.after]).collect(),
-        })
-    }
-
-    /// [`Remesh::run`], and what it did.
-    #[doc(hidden)]
-    pub fn run_reported(self) -> Result<ResaturateSummary, Error> {
-        let settings = self.settings.clone();
-        guarded(&settings, || {
-            let (summary, lock) = self.change()?;
+        let summary = guarded(&self.settings, || {
+            let Some((summary, lock)) = self.change()? else {
+                return Ok(None);
+            };
             if self.verify {
                 verify_changed(&self.path, &self.settings, lock)?;
             }
-            Ok(summary)
+            Ok(Some(summary))
+        })?;
+        let store = Store::open_with(self.path, self.settings)?;
+        Remeshed::new(store, summary.unwrap_or_default())
+    }
+
+    /// Lists the sub-domains that [`Remesh::run`] would mesh again. Nothing is changed. Errors: as there.
+    pub fn forecast(&self) -> Result<Vec<RemeshForecast>, Error> {
+        guarded(&self.settings, || {
+            let mut open = open_finished(&self.path)?;
+            let (options, request) = self.request(&mut open)?;
+            if request.ranks.is_empty() {
+                return Ok(Vec::new());
+            }
+            let budget = self.settings.budget()?;
+            let list = pipeline::forecast(&mut open, &options, &request, &budget)?.into_iter();
+            Ok(list
+                .map(|f| RemeshForecast {
+                    id: f.rank,
+                    tets: f.tets,
+                    predicted_tets: f.predicted.round(),
+                })
+                .collect())
         })
     }
 
-    fn change(&self) -> Result<(ResaturateSummary, Arc<WriterLock>), Error> {
-        let mut open = match &self.lock {
-            Some(lock) => Catalog::open_locked(&self.path, lock.clone())?,
-            None => open_to_change(&self.path, &self.settings)?,
-        };
+    fn change(&self) -> Result<Option<(ResaturateSummary, Arc<WriterLock>)>, Error> {
+        let mut open = open_to_change(&self.path, &self.settings)?;
         let lock = open.lock().expect("it is open for writing");
-        let options = Options::from(job::options_of(&open.job()?, &self.path)?);
-        let ranks = match self.repair && self.ranks.is_empty() {
-            true => damaged(&mut open)?,
-            false => self.ranks.clone(),
-        };
-        check_recipe(&mut open, self.repair, &self.settings)?;
-        let sizes = match &self.prepared {
-            Some(sizes) => Some(sizes.clone()),
-            None => self.new_sizes(&mut open, &options)?,
-        };
-        let what = Resaturation { ranks, sizes, repair: self.repair };
-        let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
-        let summary = pipeline::resaturate(&mut open, &options, &what, &budget, &watch)?;
-        open.close()?;
-        Ok((summary, lock))
-    }
-
-    fn new_sizes(&self, open: &mut Catalog, options: &Options) -> Result<Option<NewSizes>, Error> {
-        if self.sizes.is_none() && self.lengths.is_none() && self.factor == 1.0 {
+        let (options, request) = self.request(&mut open)?;
+        if request.ranks.is_empty() {
             return Ok(None);
         }
-        if !(self.factor.is_normal() && self.factor > 0.0) {
-            let message =
-                format!("a factor of {} scales nothing, expected one above zero", self.factor);
-            return Err(Error::new(Code::BadSize, message));
-        }
-        let given = self.sizes.clone();
-        if given.as_ref().is_some_and(|given| given.field.is_some()) {
-            let message = "a background mesh of arrays is for a new mesh";
-            return Err(Error::new(Code::Usage, message)
-                .with_help("give a length for each tetrahedron or vertex instead"));
-        }
-        let sizes = given.map(|given| Ok::<_, Error>((given.options()?, given.file)));
-        let asked = AskedSizes {
-            sizes: sizes.transpose()?,
-            values: self.lengths.clone(),
-            file: None,
-            factor: self.factor,
-            limits: [0.0, f64::INFINITY],
-            refine_by: json!(self.factor),
+        check_recipe(&mut open, self.repair, &self.settings)?;
+        let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
+        let summary = pipeline::resaturate(&mut open, &options, &request, &budget, &watch)?;
+        open.close()?;
+        Ok(Some((summary, lock)))
+    }
+
+    /// The options of the store, and what to mesh again in it.
+    fn request(&self, open: &mut Catalog) -> Result<(Options, Resaturation), Error> {
+        let options = Options::from(job::options_of(&open.job()?, &self.path)?);
+        let listed = match &self.ranks {
+            RemeshRanks::Listed(ranks) => ranks.clone(),
+            RemeshRanks::Changed => BTreeSet::new(),
         };
-        Ok(Some(asked.new_sizes(open, options, &self.settings)?))
+        let sizes = self.sizes.prepare(&listed, (open, &options), &self.settings)?;
+        let ranks = match (&self.ranks, &sizes) {
+            (RemeshRanks::Changed, Some(sizes)) => {
+                pipeline::changed(open, &options, sizes, &self.settings.budget()?)?
+            }
+            (RemeshRanks::Listed(ranks), _) if self.repair && ranks.is_empty() => damaged(open)?,
+            _ => listed,
+        };
+        Ok((options, Resaturation { ranks, sizes, repair: self.repair }))
     }
 }
 
-/// What is asked for in place of the sizes on record.
-#[doc(hidden)]
-pub struct AskedSizes {
-    /// Sizes beside those on record.
-    pub sizes: Option<(SizeOptions, Option<SizeFile>)>,
-    /// Lengths one by one: of the options only the gradation counts beside them.
-    pub values: Option<Values>,
-    /// Where those were read from.
-    pub file: Option<String>,
-    /// Times this.
-    pub factor: f64,
-    /// No length of `values` is taken below or above these.
-    pub limits: [f64; 2],
-    /// The factor as it was given, to be recorded.
-    pub refine_by: Value,
-}
-
-impl AskedSizes {
-    /// Errors: sizes without a meaning; a surface that is not what it was, where its edges are needed.
-    pub fn new_sizes(
-        self,
-        open: &mut Catalog,
-        options: &Options,
-        settings: &Settings,
-    ) -> Result<NewSizes, Error> {
-        let (sizes, file) = self.sizes.clone().unwrap_or_default();
-        let beta = match sizes.hgrad {
-            Some(_) => sizes.beta(),
-            None => options.mesh.sizes.beta(),
-        };
-        let mut asked = MeshOptions { sizes, size_field: file, ..MeshOptions::default() };
-        let field = match (&self.sizes, &self.values) {
-            (Some(_), None) => {
-                job::identify_sizes(&mut asked)?;
-                let mut all = options.clone();
-                all.mesh.sizes.add(&asked.sizes);
-                if asked.size_field.is_some() {
-                    all.mesh.size_field.clone_from(&asked.size_field);
-                }
-                Some(field_of_surface(open, &all, settings)?)
-            }
-            _ => None,
-        };
-        let mut asked = OptionsText::from_sizes(&asked.sizes, asked.size_field.as_ref());
-        asked.size_field = self.file.or(asked.size_field);
-        let asked = serde_json::to_value(&asked).unwrap_or_default();
-        Ok(NewSizes {
-            field,
-            values: self.values,
-            factor: self.factor,
-            limits: self.limits,
-            beta,
-            asked: json!({ "options": asked, "refine_by": self.refine_by }).to_string(),
+impl Remeshed {
+    fn new(store: Store, summary: ResaturateSummary) -> Result<Self, Error> {
+        let inserted = summary.parts.iter().map(|part| part.fine.as_ref());
+        Ok(Self {
+            store,
+            inserted_vertices: inserted
+                .map(|fine| fine.map(|f| f.refine.inserted as u64))
+                .collect(),
+            pages_read: summary.pages.pages_read,
+            pages_written: summary.pages.pages_written,
+            frames_used: summary.frames_used,
+            subdomains: summary.parts.into_iter().map(|part| [part.before, part.after]).collect(),
         })
     }
-}
-
-/// The field of the surface a store was made from, with these options. Errors: a surface that is not what it was.
-fn field_of_surface(
-    open: &mut Catalog,
-    all: &Options,
-    settings: &Settings,
-) -> Result<SizeField, Error> {
-    let (dir, cap) = (open.dir().to_owned(), settings.cap()?);
-    let scratch = scratch_beside(&tetdb_base::surface::Surface::default(), cap, &dir)?;
-    let surface = Surface::of_record(&open.job()?.surfaces, &dir, &scratch)?;
-    drop(scratch);
-    let prepared = predict(&surface.inner, all, cap, &dir)?;
-    settings.note(prepared.sizes.to_string());
-    Ok(prepared.field)
 }
 
 /// A repair must give what the recipe of then gave; any other change only says that the recipe is another.
-#[doc(hidden)]
-pub fn check_recipe(open: &mut Catalog, is_repair: bool, settings: &Settings) -> Result<(), Error> {
+fn check_recipe(open: &mut Catalog, is_repair: bool, settings: &Settings) -> Result<(), Error> {
     if is_repair {
         return job::check_recipe(open);
     }
@@ -325,8 +286,7 @@ pub fn check_recipe(open: &mut Catalog, is_repair: bool, settings: &Settings) ->
 }
 
 /// The sub-domains of which something cannot be read.
-#[doc(hidden)]
-pub fn damaged(open: &mut Catalog) -> Result<BTreeSet<u32>, Error> {
+fn damaged(open: &mut Catalog) -> Result<BTreeSet<u32>, Error> {
     let mut ranks = BTreeSet::new();
     for row in open.subdomains()? {
         match read_all(open, row.rank) {
@@ -349,8 +309,7 @@ fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), StoreError> {
 }
 
 /// Verifies a changed store, against its surface if that is still there, and puts it on record; `lock` was held since.
-#[doc(hidden)]
-pub fn verify_changed(
+fn verify_changed(
     path: &std::path::Path,
     settings: &Settings,
     lock: Arc<WriterLock>,

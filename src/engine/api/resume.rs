@@ -77,7 +77,8 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
         let at_hand = Some(&surface.inner).filter(|s| s.n_triangles() > 0);
         verify_new(path, at_hand, cap, settings, lock)?;
     }
-    Ok(Created { path: path.to_owned(), was_there: summary.is_none(), summary })
+    let traffic = summary.as_ref().map(Into::into);
+    Ok(Created { path: path.to_owned(), was_there: summary.is_none(), traffic })
 }
 
 fn go_on(

@@ -45,13 +45,11 @@ type Listener = Arc<dyn Fn(&Event) + Send + Sync>;
 pub struct Settings {
     memory: Option<Bytes>,
     threads: Option<usize>,
-    #[doc(hidden)]
-    pub cancel: CancelToken,
+    pub(super) cancel: CancelToken,
     progress: Option<Listener>,
     scratch: Option<PathBuf>,
     /// Other processes that share the work.
-    #[doc(hidden)]
-    pub hands: Hands,
+    pub(super) hands: Hands,
 }
 
 impl fmt::Debug for Settings {
@@ -108,7 +106,7 @@ impl Settings {
         self.scratch.clone().unwrap_or_else(std::env::temp_dir)
     }
 
-    #[doc(hidden)]
+    /// Threads of the run.
     pub fn n_threads(&self) -> usize {
         self.threads.unwrap_or_else(|| {
             std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
@@ -116,8 +114,7 @@ impl Settings {
     }
 
     /// The cap in words, and where it comes from.
-    #[doc(hidden)]
-    pub fn cap_in_words(&self) -> String {
+    pub(super) fn cap_in_words(&self) -> String {
         match self.memory {
             Some(cap) => format!("{cap} (as asked for)"),
             None => {
@@ -128,7 +125,6 @@ impl Settings {
     }
 
     /// The cap in bytes. Errors: `memory`, when it is less than any run needs; `usage`, when there is no thread.
-    #[doc(hidden)]
     pub fn cap(&self) -> Result<u64, Error> {
         if self.threads == Some(0) {
             return Err(
@@ -147,31 +143,26 @@ impl Settings {
         }
     }
 
-    #[doc(hidden)]
-    pub fn budget(&self) -> Result<Budget, Error> {
+    pub(super) fn budget(&self) -> Result<Budget, Error> {
         Ok(Budget::new(self.cap()?))
     }
 
-    #[doc(hidden)]
-    pub fn say(&self, event: &Event) {
+    pub(super) fn say(&self, event: &Event) {
         if let Some(listener) = &self.progress {
             listener(event);
         }
     }
 
-    #[doc(hidden)]
-    pub fn note(&self, text: impl Into<String>) {
+    pub(super) fn note(&self, text: impl Into<String>) {
         self.say(&Event::Note(text.into()));
     }
 
-    #[doc(hidden)]
-    pub fn warn(&self, text: impl Into<String>) {
+    pub(super) fn warn(&self, text: impl Into<String>) {
         self.say(&Event::Warning(text.into()));
     }
 
     /// The pipeline's events as ours.
-    #[doc(hidden)]
-    pub fn watcher(&self) -> Box<Watcher<'_>> {
+    pub(super) fn watcher(&self) -> Box<Watcher<'_>> {
         Box::new(|event: pipeline::Event| {
             self.say(&Event::Progress {
                 stage: event.stage,
@@ -183,8 +174,7 @@ impl Settings {
     }
 
     /// Progress of something counted.
-    #[doc(hidden)]
-    pub fn count(&self, stage: &'static str, done: u64, total: u64, unit: &'static str) {
+    pub(super) fn count(&self, stage: &'static str, done: u64, total: u64, unit: &'static str) {
         let total = Some(total);
         self.say(&Event::Progress { stage, done, total, unit });
     }

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
-use super::{Error, Settings, Store, guarded};
-use tetdb_io::write::{self, Content, ElementOrder, ExportSelection, MeshFormat, Share, Writers};
+use super::{Error, Store, guarded};
+use tetdb_io::write::{self, Content, ElementOrder, ExportSelection};
+pub use tetdb_io::write::{ENDINGS as MESH_ENDINGS, MeshFormat, Share, Writers};
 
 /// A writer holds no more than this, however large the cap.
 const MEMORY_MAX: u64 = 512 << 20;
@@ -15,6 +16,7 @@ const MEMORY_MAX: u64 = 512 << 20;
 #[derive(Clone, Debug, Default)]
 pub struct ExportOptions {
     selection: ExportSelection,
+    over_inputs: bool,
 }
 
 /// What was written.
@@ -102,6 +104,29 @@ impl ExportOptions {
         self.selection.ghosts = true;
         self
     }
+
+    /// Also writes over the surface the store was made from. Default: such a file is refused.
+    pub fn over_inputs(mut self) -> Self {
+        self.over_inputs = true;
+        self
+    }
+
+    /// The format of `out`, if it can hold what these options select. Nothing is written.
+    ///
+    /// Errors: `unknown-format`, `format-limit`.
+    pub fn check(&self, out: impl AsRef<Path>) -> Result<MeshFormat, Error> {
+        Ok(write::check(out.as_ref(), &self.selection)?)
+    }
+
+    /// True if each sub-domain has files of its own, which processes can [share](Self::share).
+    pub fn is_in_pieces(&self, format: MeshFormat) -> bool {
+        self.selection.in_pieces(format)
+    }
+
+    /// True if several processes can write the one file together; see [`Store::export_together`].
+    pub fn is_shared_file(&self, format: MeshFormat) -> bool {
+        self.selection.is_shared_file(format)
+    }
 }
 
 impl Store {
@@ -109,58 +134,51 @@ impl Store {
     /// `.mesh`, `.meshb`, `.mfem`, `.ele` (TetGen), `.inp`, `.npy`, `.json` (who neighbors whom), and `.parquet` with that feature.
     ///
     /// Streamed; nothing has its name before it is whole. Errors: `usage` for a folder or the surface the store was made from; `unknown-format`, `format-limit`, `disk-full`; damage.
-    #[doc(hidden)]
     pub fn export(
         &self,
         out: impl AsRef<Path>,
         options: &ExportOptions,
     ) -> Result<Exported, Error> {
-        guarded(self.settings(), || {
-            check_target(out.as_ref(), &inputs_of(self.path()))?;
-            export(self.path(), out.as_ref(), &options.selection, self.settings())
+        self.write_export(out.as_ref(), options, None)
+    }
+
+    /// [`Store::export`] as one of several processes that write one file together, each of which calls it.
+    ///
+    /// Files and counts are those of the first. Errors: as [`Store::export`], also those of other processes.
+    pub fn export_together(
+        &self,
+        out: impl AsRef<Path>,
+        options: &ExportOptions,
+        writers: &dyn Writers,
+    ) -> Result<Exported, Error> {
+        self.write_export(out.as_ref(), options, Some(writers))
+    }
+
+    fn write_export(
+        &self,
+        out: &Path,
+        options: &ExportOptions,
+        writers: Option<&dyn Writers>,
+    ) -> Result<Exported, Error> {
+        let settings = self.settings();
+        guarded(settings, || {
+            if !options.over_inputs {
+                check_target(out, &inputs_of(self.path()))?;
+            }
+            let memory = (settings.cap()? / 2).min(MEMORY_MAX) as usize;
+            let report = write::export_with(
+                &mut open_finished(self.path())?,
+                (out, &options.selection),
+                memory,
+                &|done, total| settings.count("export", done, total, "records"),
+                writers,
+            )?;
+            Ok(Exported {
+                files: report.files,
+                vertices: report.vertices,
+                tets: report.tets,
+                triangles: report.triangles,
+            })
         })
     }
-}
-
-/// What regions 1, 2, … of a finished store are called.
-#[doc(hidden)]
-pub fn region_names(store: &Path) -> Result<Vec<String>, Error> {
-    Ok(open_finished(store)?.region_names()?)
-}
-
-/// Writes one file, and what belongs to it.
-#[doc(hidden)]
-pub fn export(
-    store: &Path,
-    out: &Path,
-    selection: &ExportSelection,
-    settings: &Settings,
-) -> Result<Exported, Error> {
-    export_with(store, (out, selection), settings, None)
-}
-
-/// The same, as one of several processes that write the file together.
-#[doc(hidden)]
-pub fn export_with(
-    store: &Path,
-    (out, selection): (&Path, &ExportSelection),
-    settings: &Settings,
-    writers: Option<&dyn Writers>,
-) -> Result<Exported, Error> {
-    let mut catalog = open_finished(store)?;
-    let memory = (settings.cap()? / 2).min(MEMORY_MAX) as usize;
-    let what = (out, selection);
-    let report = write::export_with(
-        &mut catalog,
-        what,
-        memory,
-        &|done, total| settings.count("export", done, total, "records"),
-        writers,
-    )?;
-    Ok(Exported {
-        files: report.files,
-        vertices: report.vertices,
-        tets: report.tets,
-        triangles: report.triangles,
-    })
 }

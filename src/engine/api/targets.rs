@@ -20,7 +20,6 @@ const WRITTEN: [(&str, &[&str]); 1] = [("ele", &["node", "face", "edge"])];
 /// Refuses to write to `out` where that is a folder, or one of `inputs`, through whatever links; so too for what goes beside either.
 ///
 /// Errors: `usage`.
-#[doc(hidden)]
 pub fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
     let refused = |message: String| {
         Err(Error::new(Code::Usage, message).with_help("choose another name for what is written"))
@@ -55,7 +54,6 @@ fn with_others(file: &Path, others: &[(&str, &[&str])]) -> Vec<PathBuf> {
 }
 
 /// The files a store was made from.
-#[doc(hidden)]
 pub fn inputs_of(store: &Path) -> Vec<PathBuf> {
     let job = Catalog::open(store).and_then(|mut catalog| catalog.job());
     let sources = job.map(|job| job.surfaces).unwrap_or_default();

@@ -5,8 +5,9 @@ use std::time::Duration;
 use tetdb_schema::code::Code;
 
 use super::store::say_how_locked;
+use super::tasks_status::{GatherReport, TaskStatus, task_ranges};
 use super::{Error, Settings, guarded, job};
-use crate::pipeline::{self, Gathered, Performed, Planned, TASKS_MAX, TaskSettings};
+use crate::pipeline::{self, Performed, TASKS_MAX, TaskSettings};
 use tetdb_base::storage::{Budget, host_name};
 use tetdb_store::store::Catalog;
 
@@ -111,32 +112,28 @@ impl Tasks {
     /// Errors: `tasks-left` when some of the stage have to be done again, with their numbers; `no-tasks`; `busy`.
     pub fn gather(&self) -> Result<Option<Vec<u32>>, Error> {
         let gathered = self.gather_reported()?;
-        match gathered.is_finished {
-            true => Ok(None),
-            false => Ok(Some(gathered.left.into_iter().map(|(task, _)| task).collect())),
-        }
+        Ok((!gathered.finished).then_some(gathered.next))
     }
 
-    /// The same, with all that was found.
-    #[doc(hidden)]
-    pub fn gather_reported(&self) -> Result<Gathered, Error> {
+    /// [`Tasks::gather`], with everything that was done. Errors: as there.
+    pub fn gather_reported(&self) -> Result<GatherReport, Error> {
         guarded(&self.settings, || {
             let mut catalog = self.open()?;
             let gathered = pipeline::gather(&mut catalog, self.how.wait)?;
             if gathered.is_finished {
                 catalog.close()?;
-                return Ok(gathered);
+                return Ok(gathered.into());
             }
             let first = gathered.left.first();
             match first.filter(|_| gathered.is_begun()) {
-                None => Ok(gathered),
+                None => Ok(gathered.into()),
                 Some((task, why)) => {
                     let left = gathered.left.len();
                     let message = format!(
                         "{left} of {} tasks of stage {} have to be done again: {}; of task {task}: {why}",
                         gathered.tasks.len(),
                         gathered.stage[0] + 1,
-                        ranges(gathered.left.iter().map(|(task, _)| *task)),
+                        task_ranges(gathered.left.iter().map(|(task, _)| *task)),
                     );
                     let error = Error::new(Code::TasksLeft, message).at(self.store.display());
                     Err(error.with_help("do these tasks again, then gather again"))
@@ -145,10 +142,9 @@ impl Tasks {
         })
     }
 
-    /// How far tasks are; `None` where none are planned.
-    #[doc(hidden)]
-    pub fn status(&self) -> Result<Option<Planned>, Error> {
-        Ok(pipeline::status(&self.store)?)
+    /// How far the tasks are; `None` where none are planned. Nothing is changed. Errors: damage.
+    pub fn status(&self) -> Result<Option<TaskStatus>, Error> {
+        Ok(pipeline::status(&self.store)?.map(TaskStatus::from))
     }
 
     fn open(&self) -> Result<Catalog, Error> {
@@ -156,34 +152,5 @@ impl Tasks {
         say_how_locked(&catalog, &self.settings);
         job::check_recipe(&mut catalog)?;
         Ok(catalog)
-    }
-}
-
-/// Numbers that ascend, in the form of batch schedulers: `3,7-9`.
-#[doc(hidden)]
-pub fn ranges(numbers: impl IntoIterator<Item = u32>) -> String {
-    let mut ranges: Vec<[u32; 2]> = Vec::new();
-    for n in numbers {
-        match ranges.last_mut() {
-            Some([_, last]) if *last + 1 == n => *last = n,
-            _ => ranges.push([n, n]),
-        }
-    }
-    let words = ranges.iter().map(|[first, last]| match first == last {
-        true => first.to_string(),
-        false => format!("{first}-{last}"),
-    });
-    words.collect::<Vec<_>>().join(",")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_listed_as_schedulers_want_them() {
-        assert_eq!(ranges([]), "");
-        assert_eq!(ranges([3]), "3");
-        assert_eq!(ranges([1, 2, 3, 5, 7, 8]), "1-3,5,7-8");
     }
 }

@@ -20,7 +20,6 @@ use tetdb_store::sealed::Subdomain;
 use tetdb_store::store::{Catalog, StoreError};
 
 /// Looks at sub-domains for a process that adds up.
-#[doc(hidden)]
 pub struct Server {
     job: Job,
     surface: Option<Surface>,

@@ -312,7 +312,7 @@ impl Store {
     }
 
     fn report(&self, py: Python<'_>, out: PathBuf) -> PyResult<u64> {
-        self.alone(py, |store| Ok(store.report(out)?))
+        self.alone(py, |store| Ok(store.report(out)?.bytes))
     }
 
     /// Tetrahedra checked, and findings with how often each occurs.
@@ -340,7 +340,10 @@ impl Store {
         let (ranks, lengths) = (words.ranks, words.lengths);
         let (scale, repair) = (words.scale, words.repair);
         self.changed(py, callable.as_ref(), move |store| {
-            let mut remesh = store.remesh().subdomains(&ranks).scaled(scale);
+            let mut remesh = store.remesh().subdomains(&ranks);
+            if scale != 1.0 {
+                remesh = remesh.scaled(scale);
+            }
             if let Some(sizes) = sizes {
                 remesh = remesh.sizes(sizes);
             }

@@ -16,7 +16,7 @@ pub struct Remade {
 }
 
 /// What a run did, by rank.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ResaturateSummary {
     /// The sub-domains that were meshed again.
     pub parts: Vec<Remade>,

@@ -1,6 +1,5 @@
 //! How far tasks are, for whoever looks.
 
-use std::ops::Range;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -52,11 +51,6 @@ pub struct Planned {
 }
 
 impl Planned {
-    /// Tasks of the stage that is being done.
-    pub fn range(&self) -> Range<u32> {
-        self.stages.get(self.stage).map_or(0..0, Stage::tasks)
-    }
-
     /// How many tasks are done, running, failed and waiting.
     pub fn counts(&self) -> [usize; 4] {
         let mut counts = [0; 4];

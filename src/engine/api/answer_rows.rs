@@ -1,0 +1,184 @@
+//! Answers as rows of named columns.
+
+use super::VARIABLES;
+use serde_json::{Map, Value, json};
+use tetdb_schema::ids::VertexId;
+use tetdb_store::query::Hit;
+
+/// A column of answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnswerColumn {
+    /// The point that was located, of [`AnswerRow::from_point`].
+    Point,
+    /// Shares of the four corners in this point.
+    Barycentric,
+    /// Id of the tetrahedron.
+    Id,
+    /// Ids of its four vertices.
+    Vertices,
+    /// Positions of its four vertices.
+    Points,
+    /// A number: the position of its name in [`VARIABLES`].
+    Variable(usize),
+}
+
+const REGION: usize = 1;
+const SUBDOMAIN: usize = 2;
+
+impl AnswerColumn {
+    /// The column of this name: `id`, `vertices`, `points` or one of [`VARIABLES`].
+    pub fn from_name(name: &str) -> Option<Self> {
+        Some(match name {
+            "id" => Self::Id,
+            "vertices" => Self::Vertices,
+            "points" => Self::Points,
+            _ => Self::Variable(VARIABLES.iter().position(|v| *v == name)?),
+        })
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Barycentric => "barycentric",
+            Self::Id => "id",
+            Self::Vertices => "vertices",
+            Self::Points => "points",
+            Self::Variable(v) => VARIABLES[v],
+        }
+    }
+
+    /// True if its values are whole numbers.
+    pub fn is_whole(self) -> bool {
+        matches!(self, Self::Variable(REGION | SUBDOMAIN))
+    }
+
+    /// Number of its values in a row.
+    pub fn width(self) -> usize {
+        match self {
+            Self::Point => 3,
+            Self::Barycentric | Self::Vertices => 4,
+            Self::Points => 12,
+            _ => 1,
+        }
+    }
+}
+
+/// A value in a row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AnswerValue {
+    /// An id.
+    Text(String),
+    /// A whole number.
+    Whole(i64),
+    /// A number.
+    Number(f64),
+    /// None: the point lies outside of the mesh.
+    Missing,
+}
+
+/// One answer: a tetrahedron, or a point with the tetrahedron that holds it.
+#[derive(Clone, Copy, Debug)]
+pub struct AnswerRow {
+    /// The tetrahedron; `None` where a point lies outside of the mesh.
+    pub hit: Option<Hit>,
+    /// The point that was located, and the shares of the corners in it.
+    pub located: Option<([f64; 3], [f64; 4])>,
+}
+
+impl From<Hit> for AnswerRow {
+    fn from(hit: Hit) -> Self {
+        Self { hit: Some(hit), located: None }
+    }
+}
+
+impl AnswerRow {
+    /// A point with the answer of [`Store::locate_barycentric`](super::Store::locate_barycentric).
+    pub fn from_point(point: [f64; 3], found: Option<(Hit, [f64; 4])>) -> Self {
+        let shares = found.map_or([f64::NAN; 4], |(_, shares)| shares);
+        Self { hit: found.map(|(hit, _)| hit), located: Some((point, shares)) }
+    }
+
+    /// The values of a column. Shape: [`AnswerColumn::width`] values.
+    pub fn values(&self, column: AnswerColumn) -> Vec<AnswerValue> {
+        let numbers = |list: &[f64]| list.iter().map(|&x| AnswerValue::Number(x)).collect();
+        if let (AnswerColumn::Point, Some((point, _))) = (column, self.located) {
+            return numbers(&point);
+        }
+        let Some(hit) = &self.hit else {
+            return vec![AnswerValue::Missing; column.width()];
+        };
+        match column {
+            AnswerColumn::Point => Vec::new(),
+            AnswerColumn::Barycentric => {
+                numbers(&self.located.map_or([f64::NAN; 4], |(_, shares)| shares))
+            }
+            AnswerColumn::Id => vec![AnswerValue::Text(hit.id.to_string())],
+            AnswerColumn::Vertices => hit.vertices.map(vertex).map(AnswerValue::Text).into(),
+            AnswerColumn::Points => numbers(&hit.corners.map(|c| c.to_array()).concat()),
+            AnswerColumn::Variable(v) if column.is_whole() => {
+                vec![AnswerValue::Whole(hit.values()[v] as i64)]
+            }
+            AnswerColumn::Variable(v) => vec![AnswerValue::Number(hit.values()[v])],
+        }
+    }
+
+    /// The row as a JSON object, a key for each column.
+    pub fn object(&self, columns: &[AnswerColumn]) -> Value {
+        let mut object = Map::new();
+        object.insert("schema".to_owned(), json!(1));
+        for &column in columns {
+            let mut values: Vec<Value> = self.values(column).into_iter().map(json_value).collect();
+            let value = match column {
+                AnswerColumn::Points if self.hit.is_some() => {
+                    values.chunks(3).map(|c| Value::from(c.to_vec())).collect()
+                }
+                _ if self.hit.is_none() && column != AnswerColumn::Point => Value::Null,
+                _ if column.width() == 1 => values.remove(0),
+                _ => Value::from(values),
+            };
+            object.insert(column.name().to_owned(), value);
+        }
+        Value::Object(object)
+    }
+
+    /// The row as values with commas between them; parallel to [`csv_head`].
+    pub fn csv(&self, columns: &[AnswerColumn]) -> String {
+        let values = columns.iter().flat_map(|&column| self.values(column));
+        let words = values.map(|value| match value {
+            AnswerValue::Text(text) => text,
+            AnswerValue::Whole(n) => n.to_string(),
+            AnswerValue::Number(x) => x.to_string(),
+            AnswerValue::Missing => String::new(),
+        });
+        words.collect::<Vec<_>>().join(",")
+    }
+}
+
+/// The names of all values of a row with commas between them.
+pub fn csv_head(columns: &[AnswerColumn]) -> String {
+    let names = columns.iter().flat_map(|&column| {
+        let name = column.name();
+        let one = column.width() == 1;
+        (0..column.width()).map(move |i| match (one, column) {
+            (true, _) => name.to_owned(),
+            (_, AnswerColumn::Point) => format!("point_{}", ["x", "y", "z"][i]),
+            (_, AnswerColumn::Points) => format!("{}{}", ["x", "y", "z"][i % 3], i / 3),
+            _ => format!("{name}{i}"),
+        })
+    });
+    names.collect::<Vec<_>>().join(",")
+}
+
+fn vertex(number: u64) -> String {
+    VertexId::from_number(number).map_or_else(|| number.to_string(), |id| id.to_string())
+}
+
+fn json_value(value: AnswerValue) -> Value {
+    match value {
+        AnswerValue::Text(text) => text.into(),
+        AnswerValue::Whole(n) => n.into(),
+        AnswerValue::Number(x) => x.into(),
+        AnswerValue::Missing => Value::Null,
+    }
+}

@@ -1,0 +1,24 @@
+//! Regions and labels of a store by their names.
+
+use super::{Error, Summary};
+use tetdb_store::query::{QueryError, regions_called};
+
+impl Summary {
+    /// Numbers of the regions called `name`. Errors: `no-such-part`.
+    pub fn regions_called(&self, name: &str) -> Result<Vec<u32>, Error> {
+        Ok(regions_called(&self.region_names, name)?)
+    }
+
+    /// The number of the label called `name`; where no label has this name, `name` is read as a number.
+    ///
+    /// Errors: `no-such-part`.
+    pub fn label_called(&self, name: &str) -> Result<u32, Error> {
+        let by_name = self.labels.iter().position(|label| label == name);
+        let by_number = || name.parse().ok().filter(|&n| n < self.labels.len());
+        let number = by_name.or_else(by_number).ok_or_else(|| QueryError::NoLabel {
+            name: name.to_owned(),
+            known: self.labels.clone(),
+        })?;
+        Ok(number as u32)
+    }
+}

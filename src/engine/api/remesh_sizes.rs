@@ -1,0 +1,159 @@
+//! Sizes for sub-domains that are meshed again.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::mesher::predict;
+use super::preflight::scratch_beside;
+use super::{Code, Error, Settings, Sizes, Surface, job};
+use crate::pipeline::{MeshOptions, NewSizes, Options, OptionsText, SizeFile, Values};
+use tetdb_io::read::read_lengths;
+use tetdb_kernel::sizing::{Length, SizeField, SizeOptions, SizingError};
+use tetdb_store::store::{Catalog, StoreError};
+
+/// Lengths one by one.
+#[derive(Clone, Debug)]
+pub enum Lengths {
+    Given(Values),
+    /// A `.npy` file.
+    File(PathBuf),
+}
+
+/// Sizes in place of those on record; by default none.
+#[derive(Clone, Debug, Default)]
+pub struct RemeshSizes {
+    /// Beside those on record.
+    pub sizes: Option<Sizes>,
+    pub lengths: Option<Lengths>,
+    /// A factor for all lengths.
+    pub factor: Option<f64>,
+}
+
+impl RemeshSizes {
+    /// The sizes for sub-domains of these ranks; `None` for the sizes on record.
+    ///
+    /// Errors: sizes without a meaning; files that cannot be read; a surface that is not what it was, where its edges are needed.
+    pub fn prepare(
+        &self,
+        ranks: &BTreeSet<u32>,
+        (open, options): (&mut Catalog, &Options),
+        settings: &Settings,
+    ) -> Result<Option<NewSizes>, Error> {
+        let Self { sizes, lengths, factor } = self;
+        if sizes.is_none() && lengths.is_none() && factor.is_none() {
+            return Ok(None);
+        }
+        let scale = factor.unwrap_or(1.0);
+        if !(scale.is_normal() && scale > 0.0) {
+            let message = format!("a factor of {scale} scales nothing, expected one above zero");
+            return Err(Error::new(Code::BadSize, message));
+        }
+        if sizes.as_ref().is_some_and(|sizes| sizes.field.is_some()) {
+            let message = "a background mesh of arrays is for a new mesh";
+            return Err(Error::new(Code::Usage, message)
+                .with_help("give a length for each tetrahedron or vertex instead"));
+        }
+        let given = match sizes {
+            Some(sizes) => Some((sizes.options()?, sizes.file.clone())),
+            None => None,
+        };
+        let only = given.as_ref().map(|(sizes, _)| sizes);
+        let beta = match only.filter(|sizes| sizes.hgrad.is_some()) {
+            Some(sizes) => sizes.beta(),
+            None => options.mesh.sizes.beta(),
+        };
+        let (limits, values) = match lengths {
+            None => ([0.0, f64::INFINITY], None),
+            Some(lengths) => {
+                let limits = limits(open, only.unwrap_or(&SizeOptions::default()))?;
+                (limits, Some(values(lengths, ranks, open, settings.cap()?)?))
+            }
+        };
+        let (field, asked) = field(given, values.is_some(), (open, options), settings)?;
+        let mut asked = OptionsText::from_sizes(&asked.sizes, asked.size_field.as_ref());
+        if let Some(Lengths::File(file)) = lengths {
+            asked.size_field = Some(file.to_string_lossy().into_owned());
+        }
+        let asked = serde_json::to_value(&asked).unwrap_or_default();
+        let refine_by = factor.map(|factor| factor.to_string());
+        let asked = json!({ "options": asked, "refine_by": refine_by }).to_string();
+        Ok(Some(NewSizes { field, values, factor: scale, limits, beta, asked }))
+    }
+}
+
+/// The field of the given sizes beside those on record, where lengths one by one do not replace it; and the given sizes for the record.
+fn field(
+    given: Option<(SizeOptions, Option<SizeFile>)>,
+    has_lengths: bool,
+    (open, options): (&mut Catalog, &Options),
+    settings: &Settings,
+) -> Result<(Option<SizeField>, MeshOptions), Error> {
+    let is_given = given.is_some();
+    let (sizes, size_field) = given.unwrap_or_default();
+    let mut asked = MeshOptions { sizes, size_field, ..MeshOptions::default() };
+    if !is_given || has_lengths {
+        return Ok((None, asked));
+    }
+    job::identify_sizes(&mut asked)?;
+    let mut all = options.clone();
+    all.mesh.sizes.add(&asked.sizes);
+    if asked.size_field.is_some() {
+        all.mesh.size_field.clone_from(&asked.size_field);
+    }
+    Ok((Some(field_of_surface(open, &all, settings)?), asked))
+}
+
+/// The field of the surface a store was made from, with these options. Errors: a surface that is not what it was.
+fn field_of_surface(
+    open: &mut Catalog,
+    all: &Options,
+    settings: &Settings,
+) -> Result<SizeField, Error> {
+    let (dir, cap) = (open.dir().to_owned(), settings.cap()?);
+    let scratch = scratch_beside(&tetdb_base::surface::Surface::default(), cap, &dir)?;
+    let surface = Surface::of_record(&open.job()?.surfaces, &dir, &scratch)?;
+    drop(scratch);
+    let prepared = predict(&surface.inner, all, cap, &dir)?;
+    settings.note(prepared.sizes.to_string());
+    Ok(prepared.field)
+}
+
+/// Least and greatest length; shares are of the diagonal of the box of all sub-domains. Errors: they cross.
+fn limits(open: &mut Catalog, sizes: &SizeOptions) -> Result<[f64; 2], Error> {
+    let rows = open.subdomains()?;
+    let side = |axis: usize| {
+        let low = rows.iter().map(|r| r.bounds[0][axis]);
+        let high = rows.iter().map(|r| r.bounds[1][axis]);
+        high.fold(f64::NEG_INFINITY, f64::max) - low.fold(f64::INFINITY, f64::min)
+    };
+    let diagonal = (0..3).map(|axis| side(axis).powi(2)).sum::<f64>().sqrt();
+    let length = |h: &Option<Length>| h.as_ref().map(|h| h.resolve(diagonal));
+    match (length(&sizes.hmin), length(&sizes.hmax)) {
+        (Some(hmin), Some(hmax)) if hmin > hmax => Err(SizingError::Crossed { hmin, hmax }.into()),
+        (hmin, hmax) => Ok([hmin.unwrap_or(0.0), hmax.unwrap_or(f64::INFINITY)]),
+    }
+}
+
+/// The lengths for the sub-domains. Errors: the file.
+fn values(
+    lengths: &Lengths,
+    ranks: &BTreeSet<u32>,
+    open: &mut Catalog,
+    cap: u64,
+) -> Result<Values, Error> {
+    let file = match lengths {
+        Lengths::Given(values) => return Ok(values.clone()),
+        Lengths::File(file) => file,
+    };
+    let lengths = read_lengths(file, cap / 4)?;
+    let n = lengths.len() as u64;
+    let only = ranks.first().filter(|_| ranks.len() == 1);
+    let n_vertices = only.map(|&rank| Ok::<_, StoreError>(open.subdomain(rank)?.vertices));
+    // The run refuses lengths that are as many as neither.
+    Ok(match n_vertices.transpose()? {
+        Some(n_vertices) if n == n_vertices => Values::Vertices(lengths),
+        _ => Values::Tets(lengths),
+    })
+}
