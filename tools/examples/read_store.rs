@@ -4,7 +4,8 @@
 //! tetrahedra, vertices, facets and interface faces have keys composed of their kind and number; a store written with `--seal none`
 //! has working pages in their place. The program prints every row of the catalog, the counts and the first record of every kind in
 //! each file, and the files of a plan of tasks. Then it prints counts, volume and digest as `tetdb info` and `tetdb digest` do.
-//! The bytes are described in `schema/README.md`.
+//! The bytes are described in `schema/README.md`. A catalog in which a writer was killed must first be repaired by redb: open a copy
+//! of it for writing.
 
 use std::collections::BTreeMap;
 use std::error::Error;
