@@ -82,7 +82,7 @@ pub struct Job {
 /// A file the surface was read from, or the sample that generated it.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, Default, serde::Serialize)]
 pub struct SurfaceSource {
-    /// Absolute path, or `sample:...`.
+    /// Where it came from, as text; [`Source`](crate::source::Source) reads it.
     pub path: String,
     /// Length of the content in bytes.
     pub bytes: u64,
