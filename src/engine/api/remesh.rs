@@ -260,9 +260,7 @@ impl Remeshed {
         let inserted = summary.parts.iter().map(|part| part.fine.as_ref());
         Ok(Self {
             store,
-            inserted_vertices: inserted
-                .map(|fine| fine.map(|f| f.refine.inserted as u64))
-                .collect(),
+            inserted_vertices: inserted.map(|fine| fine.map(|f| f.refine.inserted)).collect(),
             pages_read: summary.pages.pages_read,
             pages_written: summary.pages.pages_written,
             frames_used: summary.frames_used,

@@ -97,7 +97,7 @@ impl Settings {
     /// Memory and temporary files of a call that only reads, less `held` bytes.
     #[doc(hidden)]
     pub fn scratch_space(&self, held: u64) -> Result<ScratchSpace, Error> {
-        Ok(ScratchSpace::new(self.cap()?.saturating_sub(held), &self.scratch_dir()))
+        Ok(ScratchSpace::new(self.cap()?.saturating_sub(held), self.scratch_dir()))
     }
 
     /// Folder of the temporary files of calls that only read.

@@ -386,7 +386,8 @@ impl Surface {
                 Ok(self)
             }
             Origin::Sheet(NamedFile { name, file }) => {
-                let sheet = Self::load_within(&[file.clone()], scratch.cap())?.oriented(scratch)?;
+                let sheet = Self::load_within(std::slice::from_ref(file), scratch.cap())?
+                    .oriented(scratch)?;
                 self.embedded(sheet, Some(name))
             }
             Origin::EmbeddedCopy(counts) => self.with_kept_wires(*counts, store, scratch),

@@ -194,7 +194,7 @@ fn nested_shells_are_told_apart() {
         (RegionPolicy::Seeds, vec![0, 0, 1], 64.0),
     ] {
         let mut mesh = make();
-        let mut rule = RegionRule::from(policy.clone());
+        let mut rule = RegionRule::from(policy);
         if policy == RegionPolicy::Seeds {
             rule.seeds = vec![seed(5.0, "core")];
         }
