@@ -32,7 +32,7 @@ fn line(columns: &[AnswerColumn], row: Option<&AnswerRow>) -> String {
             Some(row) => {
                 let words = row.values(column).into_iter().map(|cell| match cell {
                     AnswerValue::Text(text) => text,
-                    AnswerValue::Whole(n) => n.to_string(),
+                    AnswerValue::Integer(n) => n.to_string(),
                     AnswerValue::Number(x) => shown(x),
                     AnswerValue::Missing => "-".to_owned(),
                 });
@@ -45,7 +45,7 @@ fn line(columns: &[AnswerColumn], row: Option<&AnswerRow>) -> String {
             AnswerColumn::Barycentric => 38,
             AnswerColumn::Vertices => 48,
             AnswerColumn::Points => 120,
-            _ if column.is_whole() => 9,
+            _ if column.is_integer() => 9,
             AnswerColumn::Variable(_) => 12,
         };
         line += &format!("{text:>width$}  ");

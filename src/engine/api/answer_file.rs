@@ -108,7 +108,7 @@ fn field(column: AnswerColumn) -> NpyField {
         AnswerColumn::Id => ("<i8", ""),
         AnswerColumn::Vertices => ("<i8", "4"),
         AnswerColumn::Points => ("<f8", "4, 3"),
-        _ if column.is_whole() => ("<i8", ""),
+        _ if column.is_integer() => ("<i8", ""),
         AnswerColumn::Variable(_) => ("<f8", ""),
     };
     NpyField { name: column.name(), kind, shape }
@@ -128,9 +128,9 @@ fn numpy_row(row: &AnswerRow, columns: &[AnswerColumn], bytes: &mut Vec<u8>) {
                 bytes.extend(ids.iter().flat_map(|v| v.to_le_bytes()));
             }
             _ => bytes.extend(row.values(column).iter().flat_map(|value| match value {
-                AnswerValue::Whole(n) => n.to_le_bytes(),
+                AnswerValue::Integer(n) => n.to_le_bytes(),
                 AnswerValue::Number(x) => x.to_le_bytes(),
-                AnswerValue::Text(_) | AnswerValue::Missing if column.is_whole() => {
+                AnswerValue::Text(_) | AnswerValue::Missing if column.is_integer() => {
                     (-1i64).to_le_bytes()
                 }
                 AnswerValue::Text(_) | AnswerValue::Missing => f64::NAN.to_le_bytes(),

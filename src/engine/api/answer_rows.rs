@@ -48,8 +48,8 @@ impl AnswerColumn {
         }
     }
 
-    /// True if its values are whole numbers.
-    pub fn is_whole(self) -> bool {
+    /// True if its values are integers.
+    pub fn is_integer(self) -> bool {
         matches!(self, Self::Variable(REGION | SUBDOMAIN))
     }
 
@@ -69,8 +69,8 @@ impl AnswerColumn {
 pub enum AnswerValue {
     /// An id.
     Text(String),
-    /// A whole number.
-    Whole(i64),
+    /// An integer.
+    Integer(i64),
     /// A number.
     Number(f64),
     /// None: the point lies outside of the mesh.
@@ -116,8 +116,8 @@ impl AnswerRow {
             AnswerColumn::Id => vec![AnswerValue::Text(hit.id.to_string())],
             AnswerColumn::Vertices => hit.vertices.map(vertex).map(AnswerValue::Text).into(),
             AnswerColumn::Points => numbers(&hit.corners.map(|c| c.to_array()).concat()),
-            AnswerColumn::Variable(v) if column.is_whole() => {
-                vec![AnswerValue::Whole(hit.values()[v] as i64)]
+            AnswerColumn::Variable(v) if column.is_integer() => {
+                vec![AnswerValue::Integer(hit.values()[v] as i64)]
             }
             AnswerColumn::Variable(v) => vec![AnswerValue::Number(hit.values()[v])],
         }
@@ -147,7 +147,7 @@ impl AnswerRow {
         let values = columns.iter().flat_map(|&column| self.values(column));
         let words = values.map(|value| match value {
             AnswerValue::Text(text) => text,
-            AnswerValue::Whole(n) => n.to_string(),
+            AnswerValue::Integer(n) => n.to_string(),
             AnswerValue::Number(x) => x.to_string(),
             AnswerValue::Missing => String::new(),
         });
@@ -177,7 +177,7 @@ fn vertex(number: u64) -> String {
 fn json_value(value: AnswerValue) -> Value {
     match value {
         AnswerValue::Text(text) => text.into(),
-        AnswerValue::Whole(n) => n.into(),
+        AnswerValue::Integer(n) => n.into(),
         AnswerValue::Number(x) => x.into(),
         AnswerValue::Missing => Value::Null,
     }
