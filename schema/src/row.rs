@@ -1,7 +1,7 @@
 //! Keys and values of the catalog's rows: a checksum seeded with the key, then the content.
 //!
 //! The content is an archived record, except for two kinds: the format row ([`FORMAT_MAGIC`] and the version as u16), and the
-//! pieces of blobs (see [`Blob`](crate::blob::Blob)).
+//! pieces of blobs (see [`Blob`]).
 
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 

@@ -124,7 +124,8 @@ fn options(args: &ExportArgs, settings: &Settings) -> Result<ExportOptions, Fail
     if let Some(Share { number, of }) = args.share {
         options = options.share(number, of);
     }
-    let flags: [(bool, fn(ExportOptions) -> ExportOptions); 8] = [
+    type Flag = fn(ExportOptions) -> ExportOptions;
+    let flags: [(bool, Flag); 8] = [
         (args.pieces, ExportOptions::pieces),
         (args.boundary, ExportOptions::boundary),
         (args.interfaces, ExportOptions::interfaces),

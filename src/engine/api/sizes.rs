@@ -148,8 +148,8 @@ mod tests {
     fn values_on_record_mean_what_they_mean_in_code() {
         let sizes = Sizes::interior(Length::share_of_diagonal(0.02))
             .gradation(1.4)
-            .in_sphere([0.5, -1e-7, 0.0], 0.1, Length::units(0.01), None)
             .in_box([0.0; 3], [1.0, 2.0, 3.0], Length::percent(1.0), Some(Length::units(0.3)))
+            .in_sphere([0.5, -1e-7, 0.0], 0.1, Length::units(0.01), None)
             .in_cylinder([0.0; 3], [1.0; 3], 0.25, Length::units(0.1), None)
             .expression("x + 1")
             .in_region("rock, wet", Length::units(0.25));
