@@ -11,7 +11,7 @@ use super::input;
 use super::{config, export, info, memory, threads};
 use tetdb_engine::api::targets::{check_target, inputs_of};
 use tetdb_engine::api::{
-    Code, Existing, Mesher, SAMPLE_PREFIX, Settings, Traffic, resume_reported,
+    Code, Existing, Mesher, PageTraffic, SAMPLE_PREFIX, Settings, resume_reported,
 };
 
 pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
@@ -119,7 +119,7 @@ fn finish(
     path: &Path,
     args: &RunArgs,
     settings: &Settings,
-    traffic: Option<Traffic>,
+    traffic: Option<PageTraffic>,
     console: &Console,
 ) -> Result<u8, Failure> {
     write_exports(path, args, settings, console)?;

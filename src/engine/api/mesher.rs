@@ -69,13 +69,13 @@ pub struct Created {
     /// Whether the finished mesh of this job was there already.
     pub was_there: bool,
     /// Pages that the run moved; `None` where nothing was meshed.
-    pub traffic: Option<Traffic>,
+    pub traffic: Option<PageTraffic>,
 }
 
 /// Pages of the working mesh that a run moved between memory and disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Traffic {
+pub struct PageTraffic {
     /// Pages read.
     pub pages_read: u64,
     /// Pages written.
@@ -84,7 +84,7 @@ pub struct Traffic {
     pub frames_used: usize,
 }
 
-impl From<&pipeline::Summary> for Traffic {
+impl From<&pipeline::Summary> for PageTraffic {
     fn from(summary: &pipeline::Summary) -> Self {
         Self {
             pages_read: summary.pages.pages_read,

@@ -81,7 +81,7 @@ pub use memory::peak_bytes;
 #[doc(hidden)]
 pub use memory::show_bytes;
 pub use memory::{Bytes, MEMORY_LEAST};
-pub use mesher::{Created, Existing, Mesher, Traffic};
+pub use mesher::{Created, Existing, Mesher, PageTraffic};
 #[doc(hidden)]
 pub use mesher::{divide, predict};
 pub use options::{Length, Optimize, Regions, Seal, Subdomains, typed};
@@ -108,7 +108,7 @@ pub use tetdb_base::surface::show as show_point;
 pub use tetdb_base::surface::{Defect, SplitReport};
 pub use tetdb_base::surface::{Seed, SeedKind};
 pub use tetdb_io::read::WireKind as EmbeddedKind;
-pub use tetdb_io::write::SurfaceReport as SurfaceWritten;
+pub use tetdb_io::write::SurfaceWritten;
 pub use tetdb_kernel::samples::PREFIX as SAMPLE_PREFIX;
 pub use tetdb_kernel::sizing::SizeWarning;
 pub use tetdb_schema::catalog::{QualityRow, StoreState};

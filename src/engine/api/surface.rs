@@ -14,7 +14,7 @@ use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface::{self, SplitReport, SurfaceBuilder, orient_alike_with, split};
 use tetdb_io::read::{WireKind, is_stream, read_surface};
-use tetdb_io::write::{self, SurfaceReport as SurfaceWritten};
+use tetdb_io::write::{self, SurfaceWritten};
 use tetdb_kernel::samples::{PREFIX, SampleSpec};
 use tetdb_kernel::sizing::{ExtraSizes, SizeField, SizeOptions};
 

@@ -12,7 +12,7 @@ type Write = fn(&Surface, &mut Stream) -> Result<()>;
 
 /// The result of writing a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct SurfaceReport {
+pub struct SurfaceWritten {
     /// Length of the file in bytes.
     pub bytes: u64,
     /// True if the format keeps the labels.
@@ -23,7 +23,7 @@ pub struct SurfaceReport {
 ///
 /// `.stl` is text, because binary STL has single precision; `.stlb` is binary when nothing is rounded.
 /// `.ply` is binary with doubles. Errors: [`WriteError`]; `out` is not touched then.
-pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceReport> {
+pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceWritten> {
     let extension = out.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let (write, labels): (Write, bool) = match extension.to_ascii_lowercase().as_str() {
         "stl" | "stla" => (stl, true),
@@ -47,7 +47,7 @@ pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceReport> {
     write(surface, &mut stream)?;
     stream.finish()?;
     let files = outputs.publish()?;
-    Ok(SurfaceReport {
+    Ok(SurfaceWritten {
         bytes: files.iter().map(|f| f.1).sum(),
         labels_kept: labels || surface.label_names.len() <= 1,
     })
