@@ -9,14 +9,14 @@ use tetdb_kernel::sizing::SizingError;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::StoreError;
 
-/// Why a run ended without a mesh. What the store held before is still there.
+/// Errors of a pipeline run. Everything committed before the error stays in the store.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PipelineError {
     /// The surface is not valid.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
-    /// The surface did not become the boundary of volumes.
+    /// The surface could not be turned into the boundary of volumes.
     #[error(transparent)]
     Boundary(#[from] BoundaryError),
     /// The sizes are not usable.
@@ -28,15 +28,15 @@ pub enum PipelineError {
     /// Pages could not be read, written or held.
     #[error(transparent)]
     Storage(#[from] StorageError),
-    /// An option that was checked before has no meaning any more.
+    /// The value of an option is not recognized.
     #[error("{option} '{value}' is not known")]
     Option {
         /// Name of the option.
         option: &'static str,
-        /// The value it was given.
+        /// The rejected value.
         value: String,
     },
-    /// A region seed or a hole is not three numbers, and a name.
+    /// A region seed is not three numbers and a name, or a hole is not three numbers.
     #[error(
         "{option} {found}: expected three numbers{}",
         if *option == "hole" { "" } else { ", and a name behind them" }
@@ -44,85 +44,85 @@ pub enum PipelineError {
     BadSeed {
         /// Name of the option.
         option: &'static str,
-        /// The text it was given.
+        /// The rejected text.
         found: String,
     },
-    /// A sheet lies where there will be no tetrahedra.
+    /// A sheet lies in a region that is not filled.
     #[error(
         "{n} triangles of sheets lie where nothing is filled, the first is triangle {triangle} of {label:?}"
     )]
     SheetOutside {
-        /// The first such triangle.
+        /// Number of the first such triangle.
         triangle: u32,
-        /// Its label.
+        /// Label of that triangle.
         label: String,
-        /// Its middle.
+        /// Centroid of that triangle.
         at: Point,
-        /// How many there are.
+        /// Number of such triangles.
         n: u64,
     },
-    /// An edge or a point lies where there will be no tetrahedra.
+    /// An embedded edge or an embedded point lies in a region that is not filled.
     #[error("{n} of the embedded {what} lie where nothing is filled, the first of {label:?}")]
     WireOutside {
-        /// Edges or points.
+        /// The text "edges" or "points".
         what: &'static str,
-        /// Label of the first.
+        /// Label of the first such edge or point.
         label: String,
-        /// Where it is.
+        /// Position of the first: the point, or the middle of the edge.
         at: Point,
-        /// How many there are.
+        /// Number of such edges or points.
         n: u64,
     },
-    /// The sizes of a file were not handed in.
+    /// The options name a file of sizes, but its contents were not passed in.
     #[error("the sizes of {file} must be read before the mesh is begun")]
     SizeField {
         /// The file of sizes.
         file: String,
     },
-    /// Nothing is enclosed by the surface under the chosen rule for regions.
+    /// No region is filled under the chosen rule for regions.
     #[error("no region is filled: the surface encloses nothing under the rule {policy}")]
     NothingFilled {
         /// The rule for regions.
         policy: String,
     },
-    /// There is no version of before to go back to.
+    /// The store has no previous version to restore.
     #[error("{path} keeps no previous version of any sub-domain")]
     NothingToUndo {
         /// Directory of the store.
         path: std::path::PathBuf,
     },
-    /// Sizes for the tetrahedra or vertices of sub-domains that have another number of them.
+    /// The number of lengths differs from the number of tetrahedra or vertices of the sub-domains.
     #[error(
         "{found} lengths for {tets} tetrahedra or {vertices} vertices: expected one for each, in the order of the .npy export"
     )]
     SizeCount {
-        /// Number of lengths given.
+        /// Number of lengths received.
         found: u64,
-        /// Tetrahedra of the sub-domains.
+        /// Number of tetrahedra of the sub-domains.
         tets: u64,
-        /// Vertices of the sub-domains.
+        /// Number of vertices of the sub-domains.
         vertices: u64,
     },
-    /// There are no tasks to do, or not yet.
+    /// The store has no tasks, or none that can run now.
     #[error("{path} has no tasks that could be done now: {reason}")]
     NoPlan {
         /// Directory of the store.
         path: std::path::PathBuf,
-        /// Why.
+        /// Reason, in words.
         reason: String,
     },
-    /// A process that helped could not do its part.
+    /// A remote worker failed to perform its order.
     #[error("{}", .0.message)]
     Helper(RemoteFailure),
-    /// A file that tasks exchange cannot be used.
+    /// A file of the task folder cannot be used.
     #[error("{path} cannot be used: {what}")]
     TaskFile {
         /// The file.
         path: std::path::PathBuf,
-        /// What is wrong with it.
+        /// Fault of the file, in words.
         what: String,
     },
-    /// All tetrahedra came to lie on one side of a cut.
+    /// A cut left all tetrahedra on one side of its plane.
     #[error("cut {cut} leaves no tetrahedron on one side: ask for fewer sub-domains")]
     EmptyPart {
         /// Number of the cut, from 1.
@@ -137,7 +137,7 @@ impl From<SealedError> for PipelineError {
 }
 
 impl PipelineError {
-    /// The option that the message begins with.
+    /// Name of the option that the message begins with, if it begins with one.
     pub fn option(&self) -> Option<&'static str> {
         match self {
             Self::Option { option, .. } | Self::BadSeed { option, .. } => Some(option),

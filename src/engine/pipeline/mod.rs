@@ -1,16 +1,17 @@
-//! The recipe: from a closed surface to a sealed store, in steps that can each be lost but never be half done.
+//! The meshing pipeline: turns a closed surface into a sealed store, one committed step after another. An interrupted step leaves
+//! the store as it was before the step.
 //!
-//! | wing | state after it | what |
+//! | module | state after it | work |
 //! |---|---|---|
-//! | `plan` | | options, the size field and what it predicts, how the memory cap is shared out |
+//! | `plan` | | options, the size field and the estimate from it, shares of the memory cap |
 //! | `mesh::coarse` | coarse | validate; Delaunay mesh of the surface's vertices; recover every triangle; color and empty regions |
-//! | `mesh::divide` | bisected | as often as there are sub-domains less one: refine a band, choose the interface, write two children |
+//! | `mesh::divide` | bisected | one cut fewer than sub-domains; each refines a zone, chooses the interface and writes two children |
 //! | `work::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
-//! | `work`, `tasks` | | a cut or a sub-domain as an order and a receipt that any process can do and write; batches of them for schedulers |
-//! | `remesh` | sealed | sub-domains of a finished store again, from their coarse snapshots, with other sizes or because they are damaged; and back |
+//! | `work`, `tasks` | | a cut or a sub-domain as an order and a receipt that any process can read and write; batches of orders for schedulers |
+//! | `remesh` | sealed | remesh sub-domains of a finished store from coarse snapshots, with other sizes or to repair damage; undo |
 //!
-//! Inserting the surface's vertices may begin before there is a store (`mesh::head_start`). The pipeline receives a surface, not a
-//! path, and prints nothing: it reports [`Event`]s to a [`Watcher`].
+//! The insertion of the surface's vertices may begin before the store exists (`mesh::head_start`). The pipeline receives a
+//! surface, not a path. It prints nothing: it reports [`Event`]s to a [`Watcher`].
 
 mod error;
 mod mesh;

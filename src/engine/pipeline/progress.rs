@@ -1,17 +1,17 @@
-//! What a run says while it works.
+//! Progress reports of a run.
 
 use tetdb_kernel::optimize;
 
-/// What a long run says while it works.
+/// Progress of one stage of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
     /// Name of the stage: one or two words, always the same for the same work.
     pub stage: &'static str,
     /// Work done so far, in `unit`.
     pub done: u64,
-    /// Work there is in all, where that is known.
+    /// Total work in `unit`, if known.
     pub total: Option<u64>,
-    /// What `done` and `total` count.
+    /// The unit of `done` and `total`.
     pub unit: &'static str,
 }
 
@@ -26,8 +26,8 @@ impl From<optimize::Progress> for Event {
     }
 }
 
-/// Receives [`Event`]s, often; it must be quick.
+/// Callback for [`Event`]s. It is called often and must be quick.
 pub type Watcher<'a> = dyn Fn(Event) + 'a;
 
-/// The watcher that does nothing.
+/// A watcher that ignores all events.
 pub fn silent(_: Event) {}

@@ -1,4 +1,4 @@
-//! The bisection tree as the catalog keeps it, and the working meshes of its subtrees.
+//! The bisection tree as stored in the catalog, and the working meshes of its subtrees.
 
 use crate::pipeline::error::PipelineError;
 use tetdb_base::geom::{Aabb, Point};
@@ -10,10 +10,10 @@ use tetdb_schema::tree::{CutPlane, RankRange, SubtreeMesh};
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::{Catalog, StoreError};
 
-/// Generations from a subtree's mesh to the files that its order writes.
+/// Difference between the generation of a subtree's mesh and that of the files written from it.
 pub const DONE: u32 = 2;
 
-/// Reads a blob. Errors: it is missing or damaged.
+/// Reads a blob. Errors: the blob is missing or damaged.
 pub fn read_blob<T: BlobContent>(catalog: &mut Catalog, blob: Blob) -> Result<T, StoreError> {
     read_blob_with(catalog, blob, T::from_bytes)
 }
@@ -33,13 +33,13 @@ fn read_blob_with<T>(
     })
 }
 
-/// The number of sub-domains; 1 as long as it is not decided.
+/// Number of sub-domains; 1 until the number is decided.
 pub fn n_subdomains(catalog: &mut Catalog) -> Result<u32, StoreError> {
     let bytes = catalog.blob(Blob::SubdomainCount)?;
     Ok(bytes.as_deref().and_then(u32::from_bytes).unwrap_or(1))
 }
 
-/// All working meshes, in order of rank, in a store of `n` sub-domains.
+/// All working meshes of a store of `n` sub-domains, in order of rank.
 pub fn subtrees(catalog: &mut Catalog, n: u32) -> Result<Vec<SubtreeMesh>, StoreError> {
     let mut subtrees = Vec::new();
     let mut first = 0;
@@ -53,19 +53,19 @@ pub fn subtrees(catalog: &mut Catalog, n: u32) -> Result<Vec<SubtreeMesh>, Store
     Ok(subtrees)
 }
 
-/// The corners of a box as a blob has them.
+/// The corners of a box in the form in which a blob stores them.
 pub fn corners(bounds: &Aabb) -> [[f64; 3]; 2] {
     [bounds.low, bounds.high].map(|p| p.to_array())
 }
 
-/// The box of the surface.
+/// The bounding box of the surface.
 pub fn bounds(catalog: &mut Catalog) -> Result<Aabb, StoreError> {
     let corners: [[f64; 3]; 2] = read_blob(catalog, Blob::Bounds)?;
     let [low, high] = corners.map(Point::from_array);
     Ok(Aabb { low, high })
 }
 
-/// The planes of the cuts above a subtree in a store of `n` sub-domains.
+/// The planes of the cuts above a subtree, in a store of `n` sub-domains.
 pub fn zones_above(
     catalog: &mut Catalog,
     ranks: RankRange,
@@ -78,7 +78,8 @@ pub fn zones_above(
     cuts.map(plane).collect()
 }
 
-/// Refuses, before a page table is allocated, a mesh of more pages than the file has bytes for, or of more records than the pages hold.
+/// Checks the extents of a mesh before a page table is allocated. Errors: more pages than the file has bytes for, or more records
+/// than the pages hold.
 fn check_extents(mesh: &SubtreeMesh, base: &DiskPath) -> Result<(), StoreError> {
     if mesh.is_sound() && mesh.n_pages() * STORED_BYTES as u64 <= base.bytes()? {
         return Ok(());

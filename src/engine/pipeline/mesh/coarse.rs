@@ -1,4 +1,5 @@
-//! The coarse mesh: the Delaunay mesh of the surface's vertices with every triangle of it, emptied outside, and Delaunay again where recovery has left it otherwise.
+//! The coarse mesh: the Delaunay mesh of the surface's vertices with every surface triangle recovered and the outside emptied.
+//! Where recovery leaves it non-Delaunay, flips restore the Delaunay property.
 
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
@@ -12,23 +13,23 @@ use tetdb_kernel::mesh::{Mesh, MeshFacet, SHEET, VertexTag};
 use tetdb_kernel::optimize;
 use tetdb_schema::word::Word;
 
-/// What the coarse step did.
+/// Report of the coarse step.
 #[derive(Clone, Debug)]
 pub struct CoarseReport {
-    /// Work of the Delaunay insertion.
+    /// Counters of the Delaunay insertion.
     pub kernel: KernelStats,
-    /// What boundary recovery did.
+    /// Report of the boundary recovery.
     pub recovery: RecoveryReport,
-    /// The volumes and which of them are filled.
+    /// The volumes, and which of them are filled.
     pub regions: VolumeRegions,
 }
 
-/// Points between two words to the watcher.
+/// Number of points between two events to the watcher.
 const REPORT_EVERY: usize = 4096;
 
-/// Builds the coarse mesh of a valid surface into an empty mesh.
+/// Builds the coarse mesh of a valid surface in an empty mesh.
 ///
-/// Errors: triangles that cannot be recovered; regions of which none is filled. Pages and scratch files that fail unwind.
+/// Errors: a triangle that cannot be recovered; no region is filled. Failed page or scratch file accesses unwind.
 pub fn coarse<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
@@ -40,7 +41,7 @@ pub fn coarse<P: Pages>(
     recovered(mesh, kernel, options, watch)
 }
 
-/// [`triangulate`] of a valid surface.
+/// [`triangulate`] for a valid surface; panics if a vertex is refused.
 pub fn inserted<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
@@ -53,7 +54,7 @@ pub fn inserted<P: Pages>(
     })
 }
 
-/// The second half, for which the mesh's own facets suffice.
+/// Second half of [`coarse`]: recovers the surface and fills the regions. It reads the facets of the mesh, not the surface.
 pub fn recovered<P: Pages>(
     mesh: &mut Mesh<P>,
     kernel: KernelStats,
@@ -78,7 +79,8 @@ pub fn recovered<P: Pages>(
         });
     }
     if recovery.missing_segments + recovery.missing_facets > 0 {
-        // Recovery leaves it as it came. Where it is Delaunay, points find smaller cavities: an eighth less time for the division of a scan.
+        // Recovery leaves the mesh non-Delaunay. In a Delaunay mesh, inserted points have smaller cavities: dividing a scanned
+        // surface's mesh takes an eighth less time.
         optimize::run(mesh, optimize::Mode::None, &|p| watch(p.into()));
     }
     Ok(CoarseReport { kernel, recovery, regions })
@@ -88,10 +90,10 @@ fn stage(stage: &'static str) -> Event {
     Event { stage, done: 0, total: None, unit: "" }
 }
 
-/// Inserts the surface's vertices and lists its facets.
+/// Inserts the surface's vertices and adds its facets to the mesh.
 ///
-/// Vertices are numbered in the order of insertion, so that near vertices share pages; the number in the surface is
-/// kept as the owner's index. Errors: a vertex that is refused, which no vertex of a valid surface is.
+/// Vertices are numbered in the order of insertion, so that near vertices share pages. The vertex attribute keeps the number that
+/// the vertex has in the surface. Errors: a refused vertex; a valid surface has none.
 pub fn triangulate<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
@@ -144,7 +146,7 @@ mod tests {
     use tetdb_base::storage::FlatPages;
     use tetdb_kernel::samples::SampleSpec;
 
-    /// Faces of the coarse mesh that could be flipped are: what is left of them cannot.
+    /// No face of the finished coarse mesh can be flipped towards Delaunay any more.
     #[test]
     fn it_is_delaunay_again_after_recovery() {
         let spec = SampleSpec::parse("needles,count=32").expect("a good sample");

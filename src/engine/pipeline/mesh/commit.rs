@@ -1,4 +1,4 @@
-//! The catalog's side of the work: orders are drawn up from it, receipts committed to it, each in one step.
+//! Catalog access for work units: creates orders from the catalog and commits receipts to it, each in one step.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use tetdb_schema::tree::SubtreeMesh;
 use tetdb_schema::work::{CutOrder, CutReceipt, SubdomainOrder, SubdomainReceipt};
 use tetdb_store::store::{Catalog, StoreError};
 
-/// The order that bisects a subtree in a mesh of `n` sub-domains. Errors: a damaged catalog.
+/// Creates the order that bisects a subtree in a mesh of `n` sub-domains. Errors: a damaged catalog.
 pub fn cut_order(
     catalog: &mut Catalog,
     n: u32,
@@ -24,7 +24,7 @@ pub fn cut_order(
     Ok(CutOrder { parent, zones })
 }
 
-/// The order that meshes a sub-domain, once there are all cuts. Errors: a damaged catalog.
+/// Creates the order that meshes a sub-domain; all cuts above it must be committed. Errors: a damaged catalog.
 pub fn subdomain_order(
     catalog: &mut Catalog,
     n: u32,
@@ -39,7 +39,8 @@ pub fn subdomain_order(
     Ok(SubdomainOrder { mesh, zones, owners })
 }
 
-/// Commits bisections, each after those above it, in one step: of the files between them only the last children's are there.
+/// Commits bisections in one step; each comes after those above it. Of the files written, only those of the last children stay
+/// listed.
 pub fn commit_cuts(catalog: &mut Catalog, cuts: &[CutReceipt]) -> Result<(), PipelineError> {
     let mut topology = TopologyChange::none(catalog)?;
     for cut in cuts {
@@ -66,13 +67,13 @@ pub fn commit_cuts(catalog: &mut Catalog, cuts: &[CutReceipt]) -> Result<(), Pip
     Ok(())
 }
 
-/// Commits a finished sub-domain.
+/// Commits a finished sub-domain in one step.
 pub fn commit_subdomain(
     catalog: &mut Catalog,
     receipt: &SubdomainReceipt,
 ) -> Result<(), PipelineError> {
     let mut journal = receipt.journal.clone();
-    // A finished sub-domain leaves the state of the whole as it is until the last one.
+    // The state of the store changes only when the last sub-domain is sealed.
     journal.state = catalog.state()?;
     catalog.commit(|step| {
         let rank = receipt.row.rank;
@@ -89,7 +90,7 @@ pub fn commit_subdomain(
     Ok(())
 }
 
-/// Everything is sealed: regions and interfaces of the whole.
+/// Seals the store once all sub-domains are sealed: commits the regions and interfaces of the whole mesh.
 pub fn close(catalog: &mut Catalog, n: u32) -> Result<(), PipelineError> {
     let Totals { regions, interfaces } = sum_totals(catalog, n, &BTreeMap::new())?;
     let scratch = catalog.scratch_dir()?;
@@ -101,7 +102,8 @@ pub fn close(catalog: &mut Catalog, n: u32) -> Result<(), PipelineError> {
         step.set_state(StoreState::Sealed);
         Ok(())
     })?;
-    // Nothing in it counts; what cannot be removed now goes when the store is next opened for writing.
+    // The scratch folder has no data of the store. A folder that cannot be removed now goes when the store is next opened for
+    // writing.
     let _ = scratch.remove_dir_all();
     let work = catalog.work_dir();
     if work.exists() {

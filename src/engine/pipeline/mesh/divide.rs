@@ -1,4 +1,4 @@
-//! The bisections of a run, by workers of this process.
+//! The bisections of a run, by threads of this process and remote workers.
 
 use super::commit::{commit_cuts, cut_order};
 use super::run::Run;
@@ -12,11 +12,11 @@ use crate::pipeline::workers::{Hand, work_off};
 use tetdb_kernel::bisect::CutReport;
 use tetdb_schema::work::{CutOrder, CutReceipt, Receipt, WorkOrder};
 
-/// What a cut was, and how it went where this process made it.
+/// A finished cut: its order, its receipt, and the report if this process performed the cut.
 type CutDone = (CutOrder, CutReceipt, Option<CutReport>);
 
 impl Run<'_> {
-    /// Bisects until no part has more than one sub-domain, as many parts at once as there are threads and memory for.
+    /// Bisects until every subtree is one sub-domain. As many subtrees are cut at once as threads and memory allow.
     pub fn divide_all(&mut self) -> Result<Vec<CutReport>, PipelineError> {
         let mut parts = tree::subtrees(self.catalog, self.n)?;
         parts.retain(|p| p.ranks.count > 1);
@@ -24,7 +24,7 @@ impl Run<'_> {
             return Ok(Vec::new());
         }
         let workers = self.plan.workers();
-        // One part alone has all the memory: its children come when it is done.
+        // A single subtree gets all the memory: its children are cut only after it is done.
         let share = self.plan.shared_by(parts.len().min(workers).max(1) as u64);
         let mut orders = Vec::with_capacity(parts.len());
         for part in parts.into_iter().rev() {

@@ -1,8 +1,8 @@
-//! A head start: inserting a surface's vertices needs their positions alone, and goes on beside what looks at the surface.
+//! Head start: inserts a surface's vertices on a second thread while the caller examines the surface.
 //!
-//! Validation and sizes need the surface, the Delaunay mesh of its vertices needs neither of them: one thread makes it in frames that
-//! have no file, so that nothing is on disk before the surface is accepted. What does not fit its frames, and what is found not to be
-//! wanted, is dropped.
+//! Validation and size computation read the surface, but not the Delaunay mesh of its vertices. One thread builds this mesh in
+//! frames without a file, so nothing is on disk before the surface is accepted. The mesh is dropped if it exceeds its frames or
+//! if the caller rejects the surface.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,35 +20,38 @@ use tetdb_kernel::delaunay::KernelStats;
 use tetdb_kernel::mesh::Mesh;
 use tetdb_kernel::refine::{PATTERN_BYTES, find_pattern};
 
-/// Bytes of frames for each vertex: 6.4 to 7.2 tetrahedra, the vertex and its attribute. What takes more is left for later.
+/// Bytes of frames per vertex: 6.4 to 7.2 tetrahedra, the vertex and its attribute. A mesh that needs more is dropped and built
+/// later.
 const FRAMES_VERTEX: u64 = 8 * 32 + 32 + 8;
-/// Bytes of frames for each triangle: its facet, and what pages leave unused.
+/// Bytes of frames per triangle: its facet, and the unused part of pages.
 const FRAMES_TRIANGLE: u64 = 33;
-/// Bytes of frames for the last page of each kind.
+/// Bytes of frames for the last page of each kind of record.
 const FRAMES_LEAST: u64 = 1 << 20;
-/// Bytes held beside frames for each vertex: its place in the order of insertion, its number.
+/// Bytes held per vertex outside the frames: its place in the order of insertion and its number.
 const BESIDE_VERTEX: u64 = 24;
-/// Bytes that validation and sizes hold for each triangle when all is in memory, and beside that: 140 and a little.
+/// Bytes that validation and size computation hold when everything is in memory: per triangle (140 measured), and a little
+/// besides.
 const LOOK_TRIANGLE: u64 = 160;
 const LOOK_LEAST: u64 = 16 << 20;
-/// Vertices of surfaces whose inside may have room for pieces of the pattern, and whose run is longer than finding it takes (50 ms).
+/// Fewest surface vertices for which the pattern is searched. From here on, the interior may have space for pieces of the
+/// pattern, and the run takes longer than the search (50 ms).
 const PATTERN_FROM: u64 = 1 << 12;
 
-/// The vertices and facets of a surface in a mesh, inserted before there was a store.
+/// A mesh with the vertices and facets of a surface, built before the store exists.
 pub struct HeadStart {
     mesh: Mesh,
     kernel: KernelStats,
-    /// What it took.
+    /// Wall seconds of the insertion.
     pub seconds: f64,
 }
 
 impl HeadStart {
-    /// Bytes of frames it holds.
+    /// Bytes of frames the mesh holds.
     pub fn bytes(&self) -> u64 {
         frames_bytes(&self.mesh)
     }
 
-    /// The mesh, with a place for pages that leave memory and `bytes` for frames, which must hold it.
+    /// Returns the mesh with a spill file for its pages and a limit of `bytes` for frames, which must be enough for the mesh.
     pub fn into_mesh(mut self, bytes: u64, backing: Backing) -> (Mesh, KernelStats) {
         self.mesh.pages_mut().limit_with_backing(bytes, backing);
         (self.mesh, self.kernel)
@@ -59,21 +62,21 @@ fn frames_bytes(mesh: &Mesh) -> u64 {
     mesh.pages().frames_used() as u64 * tetdb_schema::page::FRAME_BYTES as u64
 }
 
-/// What a head start may take, where memory holds it beside all else.
+/// Memory of a head start, if there is enough for the head start and everything else.
 struct HeadStartShare {
     frames: u64,
-    /// With frames.
+    /// All bytes of the head start, frames included.
     all: u64,
-    /// Frames there may be once sizes are known, at most: memory that is not touched is not there.
+    /// Upper limit of the frames once sizes are known. Frames that are not touched take no memory.
     frames_later: u64,
-    /// Whether there is also room to find the pattern's tetrahedra.
+    /// True if there is also memory to search for the pattern's tetrahedra.
     finds_pattern: bool,
 }
 
 impl HeadStartShare {
     fn of(surface: &Surface, options: &Options, cap: u64) -> Option<Self> {
         let [points, triangles] = [surface.n_vertices(), surface.n_triangles()].map(|n| n as u64);
-        // Sizes from a file may take half of the memory for themselves.
+        // Sizes from a file may take half of the memory.
         if n_threads() < 2 || triangles == 0 || options.mesh.size_field.is_some() {
             return None;
         }
@@ -81,7 +84,7 @@ impl HeadStartShare {
         let all = frames + BESIDE_VERTEX * points;
         let held = surface.bytes() as u64;
         let look = LOOK_TRIANGLE * triangles + LOOK_LEAST;
-        // Once sizes are known the frames are part of the plan's.
+        // Once sizes are known, frames of the head start count as frames of the plan.
         let plan = Plan::new(cap, held + LOOK_LEAST).ok()?;
         let left = cap.checked_sub(held + all + look)?;
         (frames <= plan.frames).then_some(Self {
@@ -93,11 +96,11 @@ impl HeadStartShare {
     }
 }
 
-/// Does `look`, which finds out whether and how `surface` is to be meshed; meanwhile its vertices are inserted, where there is a second thread
-/// and memory for both under `cap`.
+/// Runs `look`, which decides if and how `surface` is meshed, and inserts the surface's vertices at the same time. The insertion
+/// takes place only with a second thread and with memory for both under `cap`.
 ///
-/// `look` receives how many bytes of the cap it has to leave. What it returns does not depend on that. Effects: none on disk.
-/// Errors: those of `look`; what was inserted is then dropped.
+/// `look` receives the number of bytes of the cap that it must leave free; its result must not depend on this number. Effects:
+/// none on disk. Errors: those of `look`; the inserted vertices are then dropped.
 pub fn ahead<T, E>(
     surface: &Surface,
     options: &Options,
@@ -116,7 +119,8 @@ pub fn ahead<T, E>(
         scope.spawn(move |_| {
             let start = begin(surface, share, is_vain, tell);
             if start.is_some() && share.finds_pattern {
-                // Nobody waits for it but who needs it. What fails fails again there.
+                // Only code that needs the pattern waits for this search. A search that fails here fails there again, and is
+                // reported there.
                 rayon::spawn(|| drop(attempt(find_pattern)));
             }
             *made.lock().expect("nobody else has it yet") = start;
@@ -124,7 +128,7 @@ pub fn ahead<T, E>(
         let vain = Vain(is_vain);
         let looked = look(share.all)?;
         std::mem::forget(vain);
-        // A thread of the pool does not wait here: the work may be its own to do.
+        // A pool thread must not wait here: the insertion may be its own next task.
         if rayon::current_thread_index().is_none() {
             hear.iter().for_each(watch);
         }
@@ -134,7 +138,7 @@ pub fn ahead<T, E>(
     Ok((looked, made))
 }
 
-/// Makes the work of the other thread vain when it is dropped, be it in a panic.
+/// Cancels the work of the other thread when dropped, also by a panic.
 struct Vain<'a>(&'a AtomicBool);
 
 impl Drop for Vain<'_> {
@@ -143,7 +147,8 @@ impl Drop for Vain<'_> {
     }
 }
 
-/// Inserts everything, or gives up: there is too little memory, or a point whose error must be reported in its turn, or the run is cancelled.
+/// Inserts all vertices. Returns `None` if memory is too small, if a point is refused or if the run is cancelled; the regular
+/// insertion reports the cause.
 fn begin(
     surface: &Surface,
     share: &HeadStartShare,
@@ -155,7 +160,7 @@ fn begin(
         if is_vain.load(Ordering::Relaxed) {
             raise(StorageError::Cancelled);
         }
-        // Nobody listens once the surface is refused.
+        // The receiver is gone once the surface is refused.
         let _ = tell.send(event);
     };
     let inserted = attempt(|| {
@@ -165,7 +170,7 @@ fn begin(
         let kernel = triangulate(&mut mesh, surface, &ScratchSpace::boundless(), &watch).ok()?;
         Some((mesh, kernel))
     });
-    // What failed here fails again, or finds memory, where it is reported.
+    // The regular insertion fails again and reports the cause, or has enough memory.
     let (mesh, kernel) = inserted.ok()??;
     Some(HeadStart { mesh, kernel, seconds: clock.elapsed().as_secs_f64() })
 }
@@ -233,7 +238,7 @@ mod tests {
         let bytes = begun.bytes();
         let (mut mesh, found) = begun.into_mesh(bytes, backing);
         assert_eq!(found, kernel);
-        // As many pages again, so that those inserted early leave memory.
+        // Writes enough scratch pages that the pages inserted early leave memory.
         let n = mesh.pages().n_pages::<{ kind::SCRATCH }>() + 4 * mesh.pages().frames_used() as u32;
         for page in 0..n {
             mesh.set_scratch((page << SLOT_BITS) * 8, page);

@@ -1,4 +1,4 @@
-//! One run: the coarse mesh, the bisections, each sub-domain to its final density.
+//! One meshing run: the coarse mesh, the bisections, and the final mesh of each sub-domain.
 
 pub(super) mod coarse;
 pub(super) mod commit;

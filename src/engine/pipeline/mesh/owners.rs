@@ -1,4 +1,4 @@
-//! Owners of the faces of cuts, and neighbors of subtrees, as the catalog keeps them.
+//! Changes of the catalog's tables: owners of interface faces, and neighbors of subtrees.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,29 +12,29 @@ use tetdb_schema::work::InheritedFace;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::{Catalog, Step, StoreError};
 
-/// A cut as far as neighbors are concerned.
+/// The data of a cut that determine neighbors.
 pub struct NewCut<'a> {
     pub cut: u32,
-    /// Faces of its interface.
+    /// Number of faces of its interface.
     pub faces: u32,
-    /// Names of the children; the low one has that of the parent.
+    /// Ranks that name the two children; the low child has the name of the parent.
     pub low: u32,
     pub high: u32,
-    /// Faces that the high child took over.
+    /// Older interface faces that the high child inherits from the parent.
     pub inherited: &'a [InheritedFace],
 }
 
-/// Changes of the catalog's tables of owners and neighbors by cuts.
+/// Pending changes of the catalog's tables of face owners and neighbors.
 pub struct TopologyChange {
-    /// By cut.
+    /// Face owners by cut.
     owners: BTreeMap<u32, FaceOwners>,
     neighbors: NeighborCounts,
-    /// Parts whose rows change.
+    /// Subtrees whose rows change.
     names: BTreeSet<u32>,
 }
 
 impl TopologyChange {
-    /// Nothing changes yet. Errors: a damaged catalog.
+    /// An empty change. Errors: a damaged catalog.
     pub fn none(catalog: &mut Catalog) -> Result<Self, StoreError> {
         Ok(Self {
             owners: BTreeMap::new(),
@@ -43,7 +43,7 @@ impl TopologyChange {
         })
     }
 
-    /// One more cut. Errors: a damaged catalog.
+    /// Adds a cut. Errors: a damaged catalog.
     pub fn add(&mut self, catalog: &mut Catalog, new: &NewCut) -> Result<(), StoreError> {
         let &NewCut { cut, faces, low, high, .. } = new;
         let (owners, neighbors) = (&mut self.owners, &mut self.neighbors);
@@ -67,13 +67,13 @@ impl TopologyChange {
             neighbors.remove(low, other);
             neighbors.add(high, other);
         }
-        // Who was a neighbor of the parent is one of a child: no other row changes.
+        // Each former neighbor of the parent is now a neighbor of a child; no other row changes.
         let beside = [low, high].into_iter().flat_map(|name| neighbors.list(name));
         self.names.extend(beside.map(|n| n.0).chain([low, high]));
         Ok(())
     }
 
-    /// Puts it into `step`.
+    /// Writes the changes into `step`.
     pub fn commit(&self, step: &mut Step) {
         for (cut, table) in &self.owners {
             step.set_blob(Blob::FaceOwners(*cut), &table.to_bytes());
