@@ -1,4 +1,4 @@
-//! Workers that take jobs from one list; what they finish is committed by one.
+//! Worker threads that take jobs from a queue; the calling thread commits their results.
 
 use std::cell::Cell;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -9,17 +9,17 @@ use super::error::PipelineError;
 use super::progress::{Event, Watcher};
 use tetdb_base::storage::RunContext;
 
-/// Milliseconds between two words of one worker.
+/// Least number of milliseconds between two progress messages of one worker.
 const TELL_EVERY: u128 = 100;
 
-/// A worker's part.
+/// The function with which a worker runs a job.
 pub type Hand<'a, J, D> = &'a (dyn Fn(J, &Watcher) -> Result<D, PipelineError> + Sync);
 
-/// Does `jobs` with a thread for each of `hands`, which do their part; `commit` takes what was done, in whatever order
-/// it is finished, and names the jobs that have become possible.
+/// Runs `jobs` with one thread per function in `hands`. `commit` receives the results in the order of completion and returns the
+/// jobs that each result makes possible.
 ///
-/// Threads of their own, not tasks of the pool: a task that waits for a sort would take up another job meanwhile, and its memory.
-/// Errors: the first of `hands` and `commit`; what others finish after it is not committed.
+/// Workers are threads, not tasks of the pool. A task that waits for a sort would start another job meanwhile and need its memory
+/// too. Errors: the first of `hands` and `commit`; results that other workers finish later are not committed.
 pub fn work_off<J: Send, D: Send>(
     jobs: Vec<J>,
     hands: &[Hand<J, D>],
@@ -38,7 +38,7 @@ pub fn work_off<J: Send, D: Send>(
             });
         }
         drop(tell);
-        // Who listens may unwind too: `watch` and `commit` are others' code.
+        // The receiving side may unwind too: `watch` and `commit` are the caller's code.
         let _alarm = Alarm(&list);
         let result = listen(&list, &hear, watch, commit);
         list.give_up();
@@ -46,10 +46,10 @@ pub fn work_off<J: Send, D: Send>(
     })
 }
 
-/// Does a job for each of `items`, in their order; `commit` takes what was done, in whatever order it is finished.
+/// Runs a job for each of `items`, in their order. `commit` receives the results in the order of completion.
 ///
-/// Of thousands of jobs only the next few are drawn up, for each knows the owners of all faces of the cuts above it. `draw` and `commit` share
-/// `state`. Errors: the first of the three.
+/// Only the next few of thousands of jobs are created in advance, because each holds the owners of all interface faces of its
+/// sub-domain. `draw` creates a job; `draw` and `commit` share `state`. Errors: the first of `draw`, `hands` and `commit`.
 pub fn map_bounded<S, I, J: Send, D: Send>(
     state: &mut S,
     items: Vec<I>,
@@ -64,7 +64,7 @@ pub fn map_bounded<S, I, J: Send, D: Send>(
     for item in items.by_ref().take(at_hand) {
         jobs.push(draw(state, item)?);
     }
-    // The last of the list is taken first.
+    // Workers take the last job of the queue first.
     jobs.reverse();
     work_off(jobs, hands, watch, &mut |done| {
         commit(state, done)?;
@@ -73,13 +73,13 @@ pub fn map_bounded<S, I, J: Send, D: Send>(
     })
 }
 
-/// What a worker says.
+/// A message from a worker.
 enum WorkerMessage<D> {
     Progress(Event),
     Done(Box<Result<D, PipelineError>>),
 }
 
-/// Hands on what workers tell, and commits what they finish.
+/// Passes progress on to `watch`, and commits finished jobs.
 fn listen<J, D>(
     list: &JobQueue<J>,
     hear: &Receiver<WorkerMessage<D>>,
@@ -95,7 +95,7 @@ fn listen<J, D>(
     Ok(())
 }
 
-/// Takes jobs until there is none and none to come.
+/// Runs jobs until the queue is empty and no job can follow.
 fn work<J, D>(
     list: &JobQueue<J>,
     run: &dyn Fn(J, &Watcher) -> Result<D, PipelineError>,
@@ -108,7 +108,7 @@ fn work<J, D>(
             let due = last.get().is_none_or(|t| t.elapsed().as_millis() > TELL_EVERY);
             if due {
                 last.set(Some(Instant::now()));
-                // Nobody listens once a step has failed.
+                // The receiver is gone once a job or a commit has failed.
                 let _ = tell.send(WorkerMessage::Progress(event));
             }
         };
@@ -119,7 +119,7 @@ fn work<J, D>(
     }
 }
 
-/// Lets nobody wait for a job of one that panicked.
+/// Stops the queue if this thread panics, so that no other thread waits for its job.
 struct Alarm<'a, J>(&'a JobQueue<J>);
 
 impl<J> Drop for Alarm<'_, J> {
@@ -130,7 +130,7 @@ impl<J> Drop for Alarm<'_, J> {
     }
 }
 
-/// Jobs to be taken, the last first.
+/// Queue of jobs; the last one is taken first.
 struct JobQueue<J> {
     state: Mutex<Jobs<J>>,
     changed: Condvar,
@@ -138,7 +138,7 @@ struct JobQueue<J> {
 
 struct Jobs<J> {
     waiting: Vec<J>,
-    /// Jobs waiting, being done, or done and not yet committed: only they can bring new ones. 0: no job is taken any more.
+    /// Number of jobs that wait, run, or are finished but not committed: only these can add new jobs. At 0, workers stop.
     open: usize,
 }
 
@@ -153,7 +153,7 @@ impl<J> JobQueue<J> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for a job; `None` when there will be none.
+    /// Waits for a job; returns `None` when no job can follow.
     fn take(&self) -> Option<J> {
         let mut jobs = self.lock();
         loop {
@@ -167,7 +167,7 @@ impl<J> JobQueue<J> {
         }
     }
 
-    /// One job is committed and has brought others.
+    /// Records that a job is committed, and adds the jobs that it made possible.
     fn done(&self, more: Vec<J>) {
         let mut jobs = self.lock();
         if jobs.open > 0 {
@@ -177,7 +177,7 @@ impl<J> JobQueue<J> {
         self.changed.notify_all();
     }
 
-    /// No job is taken any more.
+    /// Empties the queue and stops the workers.
     fn give_up(&self) {
         let mut jobs = self.lock();
         jobs.waiting.clear();
@@ -191,7 +191,7 @@ mod tests {
     use super::*;
     use crate::pipeline::progress::silent;
 
-    /// Jobs that halve a number until it is 1: `n` leaves, whatever the order.
+    /// Runs jobs that halve a number until it is 1: `n` such jobs end at 1, in any order.
     fn halve(n: u32, workers: usize, fail_at: u32) -> Result<u32, PipelineError> {
         let mut leaves = 0;
         let run = &|n: u32, _: &Watcher| match n {
@@ -238,7 +238,7 @@ mod tests {
             let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
                 work_off(vec![1, 2], &[run as Hand<u32, u32>; 2], &watch, &mut |n| {
                     assert!(!in_commit, "the same here");
-                    // One job more than there will ever be.
+                    // Adds one more job each time, without end.
                     Ok(vec![n])
                 })
             }));

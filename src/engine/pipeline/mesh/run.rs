@@ -1,4 +1,4 @@
-//! All steps of one run.
+//! Driver of one meshing run: coarse mesh, bisections, sub-domains, sealed store.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,10 +33,10 @@ use tetdb_schema::tree::{RankRange, SubtreeMesh};
 use tetdb_schema::work::{Receipt, SubdomainOrder, SubdomainReceipt, Traffic, WorkOrder};
 use tetdb_store::store::{Catalog, INPUT_TRIANGLES};
 
-/// Generation of the coarse mesh.
+/// Generation of the coarse mesh's file.
 const COARSE: u32 = 1;
 
-/// What a run did; a part is absent when an earlier run had done its step.
+/// Report of a run. A field is absent if an earlier run had already completed its step.
 #[derive(Clone, Debug)]
 pub struct Summary {
     /// The coarse mesh of the whole domain.
@@ -45,22 +45,22 @@ pub struct Summary {
     pub sizes: Option<SizeSummary>,
     /// The bisections of this run, in order.
     pub cuts: Vec<CutReport>,
-    /// What refinement and optimization did to the sub-domains of this run, by rank.
+    /// Reports of refinement and optimization for the sub-domains of this run, by rank.
     pub fine: BTreeMap<u32, FineReport>,
-    /// Sub-domains of the mesh.
+    /// Number of sub-domains of the mesh.
     pub subdomains: u32,
-    /// What was asked for, when that was more than the mesh allows.
+    /// Requested number of sub-domains, if it was larger than the mesh allows.
     pub subdomains_asked: Option<u32>,
     /// Pages read and written.
     pub pages: PagerStats,
-    /// Most pages held in memory at once.
+    /// Largest number of pages held in memory at once.
     pub frames_used: usize,
 }
 
-/// Meshes `surface`, which must be valid, into the store of `catalog`, going on from where the store stands.
+/// Meshes a valid `surface` into the store of `catalog`, starting after the last committed step.
 ///
-/// The result depends on surface and options alone: not on the budget, threads, or how often it was interrupted.
-/// Effects: commits one step after the other. Errors: the store stands at its last step.
+/// The result depends on surface and options alone, not on the budget, the threads or the number of interruptions. Effects:
+/// commits one step after another. Errors: the store keeps its last committed step.
 pub fn mesh(
     catalog: &mut Catalog,
     surface: &Surface,
@@ -90,10 +90,9 @@ pub fn mesh(
     }
 }
 
-/// [`mesh`] into a new store, with what [`prepare`] made of this surface and these options, and what [`ahead`] has made meanwhile.
+/// Like [`mesh`], for a new store, with the results of [`prepare`] and [`ahead`] for this surface and these options.
 ///
-/// A surface that is given away is dropped once the coarse mesh exists, which leaves its memory to what follows.
-/// Errors: as [`mesh`].
+/// An owned surface is dropped once the coarse mesh exists, which frees its memory for the following steps. Errors: as [`mesh`].
 pub fn mesh_prepared(
     catalog: &mut Catalog,
     surface: Cow<Surface>,
@@ -107,7 +106,7 @@ pub fn mesh_prepared(
     go_on(catalog, surface, options, field, Some(new), budget, watch)
 }
 
-/// What is known of a mesh that is not begun.
+/// Input of the first step: sizes, estimate and head start of a mesh that is not begun.
 struct New {
     sizes: SizeSummary,
     estimate: Estimate,
@@ -136,7 +135,7 @@ fn go_on(
         watch,
         slots: None,
     };
-    // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
+    // A failed page access unwinds to here. Each step commits in its last action, so no step is half done.
     attempt(|| run.steps(surface, new, held, budget))?
 }
 
@@ -146,19 +145,19 @@ pub struct Run<'a> {
     pub field: &'a SizeField,
     pub plan: Plan,
     pub bounds: Aabb,
-    /// Number of sub-domains there will be.
+    /// Number of sub-domains of the mesh.
     pub n: u32,
     pub pages: PagerStats,
     pub frames_used: usize,
     pub watch: &'a Watcher<'a>,
-    /// Orders that other processes do at once, when they have begun.
+    /// Number of orders that remote workers perform at once; `None` before they have begun.
     pub slots: Option<usize>,
 }
 
-/// One order at a time by other processes: they, and which of theirs it is.
+/// The remote workers, and the number of one of their slots; each slot performs one order at a time.
 type Slot = (Arc<dyn Helpers>, usize);
 
-/// A finished sub-domain, and how it went where this process meshed it.
+/// The receipt of a finished sub-domain, and the report if this process meshed it.
 type SubdomainDone = (Box<SubdomainReceipt>, Option<FineReport>);
 
 impl<'a> Run<'a> {
@@ -187,7 +186,7 @@ impl<'a> Run<'a> {
         if self.options.run.coarse_only {
             return self.summary(coarse, sizes, Vec::new());
         }
-        // Pages of the coarse mesh that are still resident would take the frames of the others.
+        // Resident pages of the coarse mesh would take frames from the other meshes.
         open = open.filter(|_| self.n == 1);
         let cuts = self.divide_all()?;
         let mut summary = self.summary(coarse, sizes, cuts)?;
@@ -219,7 +218,7 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// What is the same for all workers.
+    /// Parameters common to all workers.
     pub fn common(&self) -> Common<'a> {
         Common::new(self.options, self.field, self.bounds)
     }
@@ -253,13 +252,14 @@ impl<'a> Run<'a> {
         let label_names = surface.label_names.clone();
         let wires = surface.has_embedded().then(|| wires_row(&surface));
         let n_triangles = surface.n_input_triangles();
-        // All that is needed from here on is in the mesh.
+        // The mesh holds all data of the surface that the following code needs.
         drop(surface);
         let report = recovered(&mut mesh, kernel, self.options, self.watch)?;
         let space = Workspace { dir: &scratch, memory: self.plan.buffers / 2 };
         renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
         let load = self.load(&mut mesh);
-        // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.
+        // Where vertices nearly touch, sizes at points are close to zero and the estimate has no bound. The load of the mesh
+        // itself has one.
         let predicted = estimate.tets().min(TETS_PER_LOAD * load);
         let (n, _) = n_subdomains(predicted, self.options);
         let path = self.catalog.file_path(0, COARSE);
@@ -309,7 +309,7 @@ impl<'a> Run<'a> {
         Ok((mesh, report))
     }
 
-    /// The load of the coarse mesh. Effects: sets the sizes of its vertices.
+    /// Returns the load of the coarse mesh. Effects: sets the sizes of its vertices.
     fn load(&self, mesh: &mut Mesh) -> f64 {
         for v in mesh.vertex_ids() {
             let p = mesh.point(v);
@@ -318,7 +318,7 @@ impl<'a> Run<'a> {
         load_of(mesh, &|p| self.field.h(p))
     }
 
-    /// Makes the sub-domains that are left, as many at once as there are threads and memory for.
+    /// Meshes the remaining sub-domains, as many at once as threads and memory allow.
     fn leaves(
         &mut self,
         left: Vec<SubtreeMesh>,
@@ -382,7 +382,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Other processes that share the work, one entry for each order they do at once. Effects: they begin.
+    /// Returns one entry for each order that remote workers perform at once; empty without remote workers. Effects: the workers
+    /// begin.
     pub fn helpers(&mut self) -> Result<Vec<Slot>, PipelineError> {
         let Some(helpers) = self.options.run.hands.0.clone() else {
             return Ok(Vec::new());
@@ -395,7 +396,7 @@ impl<'a> Run<'a> {
         Ok((0..slots).map(|slot| (helpers.clone(), slot)).collect())
     }
 
-    /// Adds to what the run has read and written.
+    /// Adds the traffic of an order to the totals of the run.
     pub fn count(&mut self, traffic: Traffic) {
         self.pages.add(pages_of(traffic));
         self.frames_used = self.frames_used.max(traffic.frames_used as usize);

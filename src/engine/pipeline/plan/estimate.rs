@@ -1,8 +1,9 @@
-//! What a mesh will be and what it will take, before any of it exists.
+//! Estimate of a mesh before any of it exists: tetrahedra, bytes and seconds.
 //!
-//! Numbers of tetrahedra come from the size field and the surface; bytes and seconds per tetrahedron, vertex and triangle are measured.
-//! Unless another case is named, they are those of `balls,count=100` (394,000 tetrahedra on 62,000 triangles), `box,h=0.02` (1.03 million on
-//! 30,000), the armadillo (1.02 million on 52,000), `balls,count=1000` (4.04 million on 506,000).
+//! Predicted counts of tetrahedra come from the size field and the surface. Bytes and seconds per tetrahedron, vertex and
+//! triangle are measured. Unless another case is named, the measured cases are `balls,count=100` (394,000 tetrahedra on 62,000
+//! triangles), `box,h=0.02` (1.03 million on 30,000), the armadillo (1.02 million on 52,000) and `balls,count=1000` (4.04 million
+//! on 506,000).
 
 use super::regions::{refuse_outer_points, refuse_outer_sheets, region_sizes};
 use super::{MEMORY_MIN, Options, Plan};
@@ -16,128 +17,138 @@ use tetdb_kernel::sizing::{
 };
 use tetdb_store::sealed::Form;
 
-/// A seed nearer to the surface than this share of the box diagonal lies on it: the side is found by sums of doubles, which are known to
-/// some 1e-16 of it, and a thousand times more where triangles are steep.
+/// Share of the box diagonal below which a seed counts as on the surface. The side of a seed comes from sums of doubles, with an
+/// error of some 1e-16 of the diagonal, and a thousand times more where triangles are steep.
 const ON_SURFACE: f64 = 1e-12;
-/// Bytes held for each triangle once volumes are identified: which one each side has.
+/// Bytes held per triangle once volumes are identified: the volume on each of its two sides.
 const OF_SIDE: usize = size_of::<[u32; 2]>();
-/// Bytes held while sizes are computed, for each vertex: its size and slope, and lists of those and of as many places along edges near a cell,
-/// where each list is 0.42 of the one above, as it is where vertices are spread evenly.
+/// Bytes held per vertex while sizes are computed: its size and slope, and lists of the vertices near a cell and of as many
+/// points along edges. Each list has 0.42 of the length of the one above it; the ratio holds for evenly spread vertices.
 const SIZES_VERTEX: usize = 26;
-/// Bytes left for each triangle with which sizes and volumes are found side by side: eight times what they hold, so that arrays, which take a
-/// quarter of what is left at most, stay in memory.
+/// Free bytes per triangle with which sizes and volumes are computed at the same time. This is eight times the bytes that both
+/// hold. Arrays take at most a quarter of the free bytes, so they stay in memory.
 const ROOM_FOR_BOTH: usize = 8 * 160;
-/// Bytes for frames of what is not held, and for lists of a quarter of a million places.
+/// Bytes for frames of data outside memory, and for lists of a quarter of a million points.
 const PREPARE_LEAST: usize = 16 << 20;
-/// Most tetrahedra of one sub-domain where two or more are made unasked. A cut is dear: 21 million in ten take a tenth to a fifth longer than in
-/// four, with caps from 128 MiB on, and the first of the cuts is made alone however many follow.
+/// Most tetrahedra of a sub-domain where an automatic number of sub-domains is two or more. Cuts are expensive: 21 million
+/// tetrahedra in ten sub-domains take a tenth to a fifth longer than in four, with caps from 128 MiB on. The first cut runs
+/// alone, however many follow.
 const TETS_PER_SUBDOMAIN: f64 = (5u64 << 20) as f64;
-/// The same of a mesh so large that it has [`MANY`] of them in any case: 41 million in four take less time than in ten within 1 GiB too.
+/// Like `TETS_PER_SUBDOMAIN`, for a mesh so large that it has [`MANY`] sub-domains in any case. 41 million tetrahedra take less
+/// time in four sub-domains than in ten, within 1 GiB too.
 const TETS_PER_SUBDOMAIN_MAX: f64 = 2.0 * TETS_PER_SUBDOMAIN;
-/// A mesh with more than this is made in two at least: two threads are faster side by side than within one sub-domain.
+/// Most tetrahedra of a mesh in one sub-domain. Two threads are faster on two sub-domains than within one.
 const TETS_ALONE: f64 = (2u64 << 20) as f64;
-/// Sub-domains that are enough to be shared out among threads and machines.
+/// Number of sub-domains from which on threads and machines have enough of them to share.
 const MANY: f64 = 32.0;
-/// Inner tetrahedra without and with only part of the optimization, over those with all of it: 1.072 and 1.083, 1.023 and 1.026.
+/// Ratio of inner tetrahedra without optimization, and with only the Delaunay part of it, to those with full optimization.
+/// Measured: 1.072 and 1.083; 1.023 and 1.026.
 const UNOPTIMIZED: f64 = 1.078;
 const DELAUNAY: f64 = 1.025;
 
-/// Bytes of a sealed sub-domain for each tetrahedron, vertex and facet: sums within 6 % on seven surfaces.
+/// Bytes of a sealed sub-domain per tetrahedron, vertex and facet; the sums are within 6 % on seven surfaces.
 const SEALED_TET: f64 = 2.74;
 const SEALED_VERTEX: f64 = 22.1;
 const SEALED_FACET: f64 = 10.0;
-/// Bytes of the coarse snapshots for each triangle, and for each tetrahedron of the refined zones: 14 to 20, and 8 to 10.
+/// Bytes of the coarse snapshots per triangle (14 to 20) and per tetrahedron of the refined zones (8 to 10).
 const KEPT_TRIANGLE: f64 = 18.0;
 const KEPT_ZONE_TET: f64 = 9.0;
-/// Of one kept as working pages, for each record of whatever kind: a slot, and a quarter of another.
+/// Bytes per record of any kind in a sub-domain stored as working pages: one slot and a quarter of another.
 const PAGES_RECORD: f64 = 40.05;
-/// The least file of a sub-domain, of a coarse snapshot, and the catalog without its size field: redb's own pages.
+/// Smallest file of a sub-domain, smallest file of a coarse snapshot, and the catalog without its size field: redb's own pages.
 const FILE_LEAST: f64 = 50e3;
 const COARSE_FILE_LEAST: f64 = 30e3;
 const CATALOG_LEAST: f64 = 100e3;
-/// Bytes of the coarse mesh on disk for each triangle, and for each side of one that is filled: 120 to 130 with one side, 195 with both.
+/// Bytes of the coarse mesh on disk per triangle, and per side of a triangle in a filled region. Sum: 120 to 130 with one side,
+/// 195 with both.
 const COARSE_TRIANGLE: f64 = 57.0;
 const COARSE_SIDE: f64 = 69.0;
-/// Pages of the coarse mesh while it is numbered anew, over those before.
+/// Ratio of the pages of the coarse mesh during its renumbering to those before.
 const RENUMBERED: f64 = 1.6;
-/// Bytes of a bisected part on disk for each tetrahedron of its refined zones, in the box in four parts.
+/// Bytes of a bisected subtree on disk per tetrahedron of its refined zones; measured on the box in four sub-domains.
 const ZONE_TET: f64 = 65.0;
 /// Width of a refined zone in wanted lengths.
 const ZONE_WIDTH: f64 = 8.0;
-/// Pages that leave memory take up this many times what is missing of frames, for a page keeps its place while it is in memory; and never more
-/// than [`SPILLED_MAX`] times all pages. With caps from 64 to 256 MiB: 1.5 to 1.9, and up to 1.16.
+/// Scratch bytes per byte of pages that do not fit in frames. The factor is above 1 because a page in memory keeps its place in
+/// the file. The scratch file never exceeds [`SPILLED_MAX`] times all pages. Measured with caps from 64 to 256 MiB: 1.5 to 1.9,
+/// and up to 1.16.
 const SPILLED: f64 = 2.0;
 const SPILLED_MAX: f64 = 1.15;
-/// Bytes of runs for each tetrahedron of the sub-domain that is sorted to be sealed, and the share of buffers a sort takes before it writes runs.
+/// Bytes of sort runs per tetrahedron of a sub-domain being sealed, and the share of buffers that a sort fills before it writes
+/// runs.
 const SORTED_TET: f64 = 25.0;
 const SORT_SHARE: f64 = 0.25;
 
-/// Bytes of frames for each tetrahedron: 100 to 105.
+/// Bytes of frames per tetrahedron: 100 to 105.
 const FRAMES_TET: f64 = 102.0;
-/// Bytes held beside the frames: by the program and its code, 17 to 19 MB; by buffers that fill up soon; for each tetrahedron; for each triangle of the input.
+/// Bytes held besides the frames: the program and its code (17 to 19 MB); buffers, at most and per tetrahedron, which soon reach
+/// their maximum; other data per tetrahedron; other data per triangle of the input.
 const PROGRAM: f64 = 18e6;
 const BUFFERS_MAX: f64 = 8e6;
 const BUFFERS_TET: f64 = 200.0;
 const BESIDE_TET: f64 = 45.0;
 const BESIDE_TRIANGLE: f64 = 200.0;
-/// Held beyond the cap: code, stacks, what the allocator keeps. 17 to 20 MB.
+/// Bytes held beyond the cap for code, stacks and memory that the allocator keeps: 17 to 20 MB.
 const BEYOND_CAP: f64 = 18e6;
 
-/// CPU seconds for each tetrahedron and each triangle on one core of an EPYC at 2.6 GHz. Where needles make recovery slow it may take ten times that.
+/// CPU seconds per tetrahedron and per triangle on one core of an EPYC at 2.6 GHz. Where needles slow the recovery, it may take
+/// ten times as long.
 const SECONDS_TET: f64 = 1.0 / 240e3;
 pub(super) const SECONDS_TRIANGLE: f64 = 7.5e-6;
-/// For verification.
+/// CPU seconds of verification per tetrahedron.
 pub(super) const SECONDS_VERIFY: f64 = 0.6e-6;
 
-/// What to expect of a mesh.
+/// Predicted counts of a mesh, from which its bytes and seconds follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Predicted tetrahedra.
     pub counts: TetCounts,
-    /// Triangles of the surface.
+    /// Number of triangles of the surface.
     pub triangles: u64,
-    /// Sides of triangles in a filled region.
+    /// Number of triangle sides in filled regions.
     sides: u64,
-    /// Predicted vertices.
+    /// Predicted number of vertices.
     pub vertices: f64,
-    /// Sub-domains the mesh will have.
+    /// Number of sub-domains of the mesh.
     pub subdomains: u32,
-    /// What was asked for, when that was more than the mesh allows.
+    /// Requested number of sub-domains, if it was larger than the mesh allows.
     pub subdomains_asked: Option<u32>,
     surface_bytes: u64,
     least_to_prepare: u64,
-    /// Of the size field: its octree, and sizes at corners, which go to a scratch file where their share of the cap is too small.
+    /// Bytes of the size field: its octree, and the sizes at cell corners. The sizes go to a scratch file if their share of the
+    /// cap is too small.
     octree_bytes: u64,
     sizes_bytes: u64,
-    /// How finished sub-domains are kept.
+    /// Storage form of finished sub-domains.
     form: Form,
-    /// Whether the coarse snapshots stay in the store.
+    /// True if the coarse snapshots stay in the store.
     keeps_coarse: bool,
 }
 
-/// A size field and what it makes expect: everything before the first step.
+/// The results that precede the first step: a size field and the estimate from it.
 #[derive(Clone, Debug)]
 pub struct Prepared {
     /// The size field.
     pub field: SizeField,
-    /// What the size field was built from, and its extremes.
+    /// Sources of the size field, and its extremes.
     pub sizes: SizeSummary,
     /// The predicted mesh.
     pub estimate: Estimate,
-    /// What is worth knowing of the regions.
+    /// Notes on the regions for the user.
     pub notes: Vec<String>,
 }
 
-/// Builds the size field and counts what it will give. It makes nothing on disk. `background` is what the options' `size_field` holds.
+/// Builds the size field and predicts the counts of the mesh. `background` has the contents of the options' `size_field`.
 ///
-/// The result depends on surface and options alone. Errors: options that make no sense for the surface; orientations that contradict each other.
+/// The result depends on surface and options alone. Effects: no mesh or store on disk. Errors: options that make no sense for the
+/// surface; orientations that contradict each other.
 pub fn prepare(
     surface: &Surface,
     options: &Options,
     background: Option<&Background>,
     scratch: &ScratchSpace,
 ) -> Result<Prepared, PipelineError> {
-    // A scratch file that fails unwinds to here.
+    // A failing scratch file unwinds to here.
     attempt(|| prepare_in(surface, options, background, scratch))?
 }
 
@@ -166,7 +177,7 @@ fn prepare_in(
         SizeField::build_with(&surface.points, &surface.triangles, asked, &further, scratch)
     };
     let enclosed = || {
-        // Counted before the tree takes its share of what is left.
+        // Leased before the tree takes its share of the free bytes.
         let _held = scratch.lease(VOLUMES_TRIANGLE * surface.n_triangles());
         let seeker = Seeker::with_filter(surface, scratch, |_| true);
         let volumes = EnclosedVolumes::new_in(&seeker, scratch);
@@ -179,7 +190,7 @@ fn prepare_in(
         let (early, enclosed) = join(|| built(&[]), enclosed);
         (Some(early?), enclosed)
     } else {
-        // What building takes is given back before the surface's tree is built.
+        // The memory of building the field is free again before the surface's tree is built.
         let early = built(&[])?;
         let _early = scratch.lease(early.0.octree_bytes());
         (Some(early), enclosed())
@@ -202,7 +213,7 @@ fn prepare_in(
     Ok(Prepared { field, sizes, estimate, notes: notes(&chosen, options, volumes.n_volumes - 1) })
 }
 
-/// The volumes that are filled. Errors: seeds that say what cannot be.
+/// Returns the filled volumes. Errors: a seed on a triangle; seeds that contradict each other or the rule.
 fn chosen(
     seeker: &Seeker,
     volumes: &EnclosedVolumes,
@@ -225,7 +236,8 @@ fn chosen(
     Ok(rule.apply(chosen, OUTSIDE, end, |p| volumes.at(seeker, p))?)
 }
 
-/// What is worth knowing of seeds: where some regions have a name, how many have none; how many of the `n` volumes have no seed.
+/// Notes on seeds: the number of unnamed regions if some have names, and how many of the `n` volumes stay empty under a rule by
+/// seeds.
 fn notes(chosen: &Filled, options: &Options, n: u32) -> Vec<String> {
     let filled = chosen.volumes.len();
     let (unnamed, empty) = (filled - chosen.names.len(), n as usize - filled);
@@ -274,7 +286,7 @@ impl Estimate {
         self.counts.tets()
     }
 
-    /// Bytes of surface and size field, held all the time under `cap`.
+    /// Bytes of the surface and the size field, which stay in memory all the time under a cap of `cap`.
     pub fn resident_bytes(&self, cap: u64) -> u64 {
         let share = SizeField::share_of(cap.saturating_sub(self.surface_bytes));
         self.surface_bytes + self.octree_bytes + self.sizes_bytes.min(share)
@@ -291,7 +303,7 @@ impl Estimate {
         (sealed + files) as u64 + self.octree_bytes + self.sizes_bytes + self.coarse_bytes()
     }
 
-    /// Bytes of the coarse snapshots in it.
+    /// Bytes of the coarse snapshots in the store.
     fn coarse_bytes(&self) -> u64 {
         if !self.keeps_coarse {
             return 0;
@@ -300,14 +312,15 @@ impl Estimate {
         (KEPT_TRIANGLE * self.triangles as f64 + KEPT_ZONE_TET * self.zone_tets() + files) as u64
     }
 
-    /// Most bytes on disk while it is meshed with `cap` bytes of memory by so many threads.
+    /// Peak of bytes on disk while `threads` threads mesh with `cap` bytes of memory.
     pub fn disk_peak_bytes(&self, cap: u64, threads: usize) -> u64 {
         let (n, at_once) = (f64::from(self.subdomains), self.at_once(threads));
         let (frames, buffers) = match Plan::new(cap, self.resident_bytes(cap)) {
             Ok(plan) => (plan.frames as f64, plan.buffers as f64),
             Err(_) => (0.0, 0.0),
         };
-        // A part's file goes when it is sealed: before the first is, and while the last are.
+        // The working file of a sub-domain is removed when its sealed file is listed. Two moments may be the peak: before the
+        // first removal, and while the last sub-domains are sealed.
         let parts = self.coarse_mesh_bytes() + ZONE_TET * self.zone_tets();
         let store = self.store_bytes() as f64;
         let files = (parts + at_once / n * store).max(store + at_once / n * parts);
@@ -325,7 +338,8 @@ impl Estimate {
         COARSE_TRIANGLE * self.triangles as f64 + COARSE_SIDE * self.sides as f64
     }
 
-    /// Most bytes on disk during the first cut: the coarse mesh, the same with the refined zone as pages, and the two parts.
+    /// Peak of bytes on disk during the first cut: the coarse mesh, the pages of the coarse mesh with its refined zone, and the
+    /// two subtrees.
     fn first_cut_bytes(&self, frames: f64) -> f64 {
         if self.subdomains == 1 {
             return 0.0;
@@ -334,24 +348,24 @@ impl Estimate {
         let zone = (ZONE_WIDTH / side).min(1.0) * self.tets();
         let coarse = self.coarse_mesh_bytes();
         let pages = RENUMBERED * coarse + FRAMES_TET * zone;
-        // Half of the frames are for the parts.
+        // Half of the frames belong to the subtrees.
         2.0 * coarse + ZONE_TET * zone + spilled(pages, 0.5 * frames)
     }
 
-    /// Most bytes the process will hold with a cap of `cap`.
+    /// Peak of bytes that the process holds with a cap of `cap`.
     pub fn memory_bytes(&self, cap: u64, threads: usize) -> u64 {
         self.memory_full_bytes(threads).min(cap + BEYOND_CAP as u64)
     }
 
-    /// The same without a cap: more memory than this changes nothing.
+    /// Like `memory_bytes`, without a cap: more memory than this changes nothing.
     pub fn memory_full_bytes(&self, threads: usize) -> u64 {
         let pages = self.pages_bytes(threads);
         let buffers = (BUFFERS_TET * self.tets()).min(BUFFERS_MAX);
-        // All triangles while the coarse mesh is built, later those of the sub-domains at hand.
+        // All triangles of the surface while the coarse mesh is built, later those of the sub-domains in work.
         let triangles = BESIDE_TRIANGLE * self.triangles as f64;
         let share = self.at_once(threads) / f64::from(self.subdomains);
         let beside = BESIDE_TET / FRAMES_TET * pages + share * triangles;
-        // A part that is opened again is read through a cache.
+        // A subtree that is opened again is read through a cache.
         let cache = match self.subdomains {
             1 => 0.0,
             _ => ZONE_TET * self.zone_tets().min(1e6),
@@ -359,7 +373,7 @@ impl Estimate {
         (PROGRAM + buffers + (pages + beside + cache).max(triangles)) as u64
     }
 
-    /// The smallest cap under which all steps find room.
+    /// Smallest cap with enough memory for all steps.
     pub fn memory_least_bytes(&self) -> u64 {
         let mut cap = (self.least_to_prepare + self.octree_bytes).max(MEMORY_MIN);
         while Plan::new(cap, self.resident_bytes(cap)).is_err() {
@@ -368,7 +382,7 @@ impl Estimate {
         cap
     }
 
-    /// Seconds on so many threads, with verification. Only sub-domains are meshed side by side.
+    /// Wall seconds on `threads` threads, with verification. Only the meshing of sub-domains uses several threads.
     pub fn seconds(&self, threads: usize) -> f64 {
         let side_by_side = f64::from(self.subdomains).min(threads.max(1) as f64);
         SECONDS_TRIANGLE * self.triangles as f64
@@ -376,17 +390,17 @@ impl Estimate {
             + SECONDS_VERIFY * self.tets()
     }
 
-    /// Sub-domains meshed at one time.
+    /// Number of sub-domains meshed at once.
     fn at_once(&self, threads: usize) -> f64 {
         f64::from(self.subdomains).min(threads.max(1) as f64)
     }
 
-    /// Their pages.
+    /// Bytes of pages of the sub-domains meshed at once.
     fn pages_bytes(&self, threads: usize) -> f64 {
         FRAMES_TET * self.tets() / f64::from(self.subdomains) * self.at_once(threads)
     }
 
-    /// Tetrahedra of the refined zones of all cuts, were the domain a cube cut into cubes.
+    /// Tetrahedra of the refined zones of all cuts, modeled as a cube cut into cubes.
     fn zone_tets(&self) -> f64 {
         let n = f64::from(self.subdomains);
         let side = (self.counts.inner_vertices / n).cbrt().max(1.0);
@@ -395,12 +409,12 @@ impl Estimate {
     }
 }
 
-/// Bytes of the scratch file for so many bytes of pages with so many of frames.
+/// Bytes of the scratch file for `pages` bytes of pages with `frames` bytes of frames.
 fn spilled(pages: f64, frames: f64) -> f64 {
     (SPILLED * (pages - frames)).clamp(0.0, SPILLED_MAX * pages)
 }
 
-/// The smallest cap under which this surface may be meshed, as far as it alone tells: the size field needs a little more.
+/// Smallest cap for this surface, from the surface alone; the size field needs a little more.
 pub fn least_for(surface: &Surface) -> u64 {
     let mut cap = least_to_prepare(surface, false).max(MEMORY_MIN);
     while Plan::new(cap, surface.bytes() as u64).is_err() {
@@ -409,7 +423,7 @@ pub fn least_for(surface: &Surface) -> u64 {
     cap
 }
 
-/// The smallest cap under which volumes and sizes can be computed: one after the other, unless regions have sizes of their own.
+/// Smallest cap with which volumes and sizes can be computed. They are computed in turn, unless regions have sizes of their own.
 fn least_to_prepare(surface: &Surface, regions_have_sizes: bool) -> u64 {
     let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());
     let (volumes, sizes) = (VOLUMES_TRIANGLE * triangles, SIZES_VERTEX * vertices);
@@ -420,11 +434,11 @@ fn least_to_prepare(surface: &Surface, regions_have_sizes: bool) -> u64 {
     (surface.bytes() + beside + PREPARE_LEAST) as u64
 }
 
-/// Number of sub-domains for a mesh of `tets` tetrahedra, and the number asked for where that is larger.
+/// Number of sub-domains for a mesh of `tets` tetrahedra, and the requested number if that is larger.
 pub fn n_subdomains(tets: f64, options: &Options) -> (u32, Option<u32>) {
     let asked = options.mesh.subdomains.count();
     let each = (tets / MANY).clamp(TETS_PER_SUBDOMAIN, TETS_PER_SUBDOMAIN_MAX);
-    // An even number of them: three take longer on two threads than two or four.
+    // The number is even: three sub-domains take longer on two threads than two or four.
     let auto = match tets > TETS_ALONE {
         true => 2.0 * (0.5 * tets / each).ceil(),
         false => 1.0,
@@ -458,7 +472,7 @@ mod tests {
         assert_eq!(made.sizes.to_string(), wide.sizes.to_string());
         assert_eq!(made.field.to_bytes(), wide.field.to_bytes());
         assert!(made.field.bytes() < wide.field.bytes());
-        // What is held of it, and no more, is what the ledger has recorded.
+        // The ledger has recorded the bytes that the field holds, and no more.
         assert!(made.field.bytes() as u64 <= wide.estimate.octree_bytes + (1 << 20));
         Ok(())
     }
@@ -466,7 +480,7 @@ mod tests {
     #[test]
     fn a_large_mesh_has_fewer_subdomains_for_its_size() {
         let options = Options::default();
-        // From 32 on they grow, and when they are twice as large there are more of them.
+        // From 32 sub-domains on they grow to twice the size, then their number grows.
         let shares = [(0.6, 2), (2.0, 2), (2.1, 4), (10.0, 10), (32.0, 32), (48.0, 32)];
         for (shares, n) in shares.into_iter().chain([(500.0, 250)]) {
             assert_eq!(n_subdomains(shares * TETS_PER_SUBDOMAIN, &options).0, n);

@@ -1,38 +1,40 @@
-//! How long workers on many machines take together, from predicted numbers alone.
+//! Forecast of the wall time of many workers on many machines, from predicted counts alone.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::estimate::{Estimate, SECONDS_TRIANGLE, SECONDS_VERIFY};
 
-/// CPU seconds of a cut: for each triangle of the part's surface, and for each tetrahedron at a plane, of which the part has as many as the power 2/3 of all.
-/// Fitted to the cuts of two meshes on an idle EPYC at 2.6 GHz: of 211 million (34.9 s for the first, 408 s for all 99; these say 33.4 and 396) and of 20
-/// million (7.7 and 28.0; 7.0 and 29.2).
+/// CPU seconds of a cut: per triangle of the subtree's surface, and per tetrahedron near the cutting plane. The number of the
+/// latter is taken as the number of all tetrahedra of the subtree to the power 2/3.
+///
+/// Fitted to the cuts of two meshes on an idle EPYC at 2.6 GHz. With 211 million tetrahedra the first cut took 34.9 s and all 99
+/// cuts 408 s; the fit gives 33.4 and 396. With 20 million they took 7.7 and 28.0 s; the fit gives 7.0 and 29.2.
 const CUT_TRIANGLE: f64 = 1.4e-6;
 const CUT_PLANE: f64 = 6.5e-5;
-/// CPU seconds of a sub-domain for each of its tetrahedra, of the same meshes: 2.65 and 2.82.
+/// CPU seconds per tetrahedron of a sub-domain; measured on the same two meshes: 2.65 and 2.82 microseconds.
 const SUBDOMAIN_TET: f64 = 2.75e-6;
 
-/// Wall seconds of workers with a thread each.
+/// Wall seconds with any number of workers of one thread each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
-    /// Before the cuts and after the sub-domains, in one process: surface, sizes, coarse mesh, verification.
+    /// Work of one process before the cuts and after the sub-domains: surface, sizes, coarse mesh, verification.
     pub serial_s: f64,
-    /// The tree of cuts.
+    /// All cuts.
     pub cuts_s: f64,
-    /// Sub-domains, each by whoever is free.
+    /// All sub-domains, each meshed by the next free worker.
     pub subdomains_s: f64,
 }
 
 impl Forecast {
-    /// All of it.
+    /// Sum of the three.
     pub fn wall_s(self) -> f64 {
         self.serial_s + self.cuts_s + self.subdomains_s
     }
 }
 
 impl Estimate {
-    /// What `workers` take, of any number of machines; 0 counts as 1.
+    /// Forecasts the wall time of `workers` workers on any number of machines; 0 counts as 1.
     pub fn forecast(&self, workers: u32) -> Forecast {
         let (workers, n) = (workers.max(1), self.subdomains);
         let per_subdomain = SUBDOMAIN_TET * self.tets() / f64::from(n);
@@ -48,11 +50,12 @@ impl Estimate {
     }
 }
 
-/// Seconds of all cuts of `n` sub-domains, each of so many of them: a cut begins when the one above it is done, the widest first.
+/// Wall seconds of all cuts of a mesh with `n` sub-domains. `seconds` gives the time of a cut from the number of sub-domains
+/// below it. A cut begins after the one above it; among those ready, the widest begins first.
 fn tree_seconds(n: u32, workers: u32, seconds: impl Fn(u32) -> f64) -> f64 {
     let is_wide = |&count: &u32| count > 1;
     let mut ready = BinaryHeap::from_iter([n].into_iter().filter(is_wide));
-    // Ends in nanoseconds, which have an order.
+    // End times in nanoseconds: unlike floats, integers are ordered.
     let mut running = BinaryHeap::new();
     let mut now = 0;
     loop {

@@ -1,4 +1,4 @@
-//! What is held all through a run, and what is left to share out.
+//! Memory leases held throughout a run, and the plan for the remaining bytes.
 
 use super::{Options, Plan};
 use crate::pipeline::error::PipelineError;
@@ -6,11 +6,11 @@ use tetdb_base::storage::{Budget, Lease};
 use tetdb_base::surface::Surface;
 use tetdb_kernel::sizing::SizeField;
 
-/// Share of the surface that stays with the process once it is dropped, as heap between what is still in use: with 50,000 grains 21 MB of 120
-/// were still there while sub-domains were meshed, which a resumed run never held.
+/// Divisor for the part of the surface's memory that the process keeps after the surface is dropped: heap between blocks still in
+/// use. With 50,000 grains, 21 MB of 120 remained while sub-domains were meshed; a resumed run never held them.
 const LEFT_BEHIND: usize = 8;
 
-/// What the ledger has given to a run, and how it is shared out.
+/// The leases of a run, and the plan that divides the bytes of the working mesh.
 pub struct Leases {
     pub plan: Plan,
     surface: Lease,
@@ -20,7 +20,7 @@ pub struct Leases {
 }
 
 impl Leases {
-    /// Errors: the ledger has too little.
+    /// Takes the leases of a run and plans its memory. Errors: the budget is too small.
     pub fn of(
         surface: &Surface,
         field: &SizeField,
@@ -47,7 +47,7 @@ impl Leases {
         Ok((plan, budget.lease(bytes, "the working mesh")?))
     }
 
-    /// Shares out what the surface took, too, but for what it leaves behind.
+    /// Drops the surface's lease and plans again with its bytes, except those that stay behind in the heap.
     pub fn without_surface(
         self,
         options: &Options,

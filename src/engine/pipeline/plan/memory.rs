@@ -1,45 +1,46 @@
-//! How the cap is shared out before the first byte is read.
+//! Division of the memory cap among frames, caches and buffers, before the first byte is read.
 
 use tetdb_base::storage::{StorageError, n_threads};
 
-/// No run fits less: fewer frames than this thrash.
+/// Smallest cap of a run; with fewer frames, pages thrash.
 pub const MEMORY_MIN: u64 = 64 << 20;
-/// redb's cache beyond this brings nothing: three batches of 16 MiB. Frames are worth more than it long before: pages that are in neither cost
-/// 45 microseconds each, and 1.8 million tetrahedra with 160 MiB read a tenth as many when caches and buffers got half of what they had.
+/// Largest useful cache of redb: three batches of 16 MiB. Well below this limit, frames are worth more than cache. A page in
+/// neither costs 45 microseconds. 1.8 million tetrahedra with 160 MiB read a tenth as many pages when caches and buffers got half
+/// of their usual share.
 const REDB_MAX: u64 = 48 << 20;
-/// The catalog's cache and what small things the catalog holds.
+/// The catalog's cache and other small data of the catalog.
 const CATALOG: u64 = 3 << 20;
-/// Scratch of a phase (candidates, sort runs, chunks being encoded) beyond this brings nothing.
+/// Largest useful scratch of a phase (candidates, sort runs, chunks being encoded).
 const BUFFERS_MAX: u64 = 384 << 20;
 
-/// Frames one of several workers needs at least.
+/// Fewest bytes of frames for each of several workers.
 const FRAMES_OF_WORKER: u64 = 24 << 20;
 
-/// Bytes for each use.
+/// Bytes of memory by use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// Frames of the working mesh.
+    /// Bytes for the frames of the working mesh.
     pub frames: u64,
-    /// redb's cache of the file being written; half as much again is leased for the one being read.
+    /// Bytes for redb's cache of the file being written. The lease adds half as much for the file being read.
     pub redb: u64,
-    /// Everything else a phase holds.
+    /// Bytes for everything else that a phase holds.
     pub buffers: u64,
 }
 
 impl Plan {
-    /// Shares out `cap` bytes beside `held` bytes that stay (surface, size field).
+    /// Divides `cap` bytes, of which `held` bytes stay occupied (surface, size field).
     ///
-    /// Errors: [`StorageError::Budget`] when less than half of [`MEMORY_MIN`] would be left for frames.
+    /// Errors: [`StorageError::Budget`] when less than a quarter of [`MEMORY_MIN`] would be left for frames.
     pub fn new(cap: u64, held: u64) -> Result<Self, StorageError> {
         let wide = Self::with_shares(cap, held, 1);
         match &wide {
-            // What is held leaves few frames: they need it more than caches and buffers.
+            // The held bytes leave few frames, which need memory more than caches and buffers do.
             Ok(plan) if plan.frames >= cap / 8 => wide,
             _ => Self::with_shares(cap, held, 2),
         }
     }
 
-    /// With caches and buffers of the `narrow`th part of their usual share.
+    /// Divides `cap` with caches and buffers of 1/`narrow` of their usual share.
     fn with_shares(cap: u64, held: u64, narrow: u64) -> Result<Self, StorageError> {
         let redb = (cap / 16 / narrow).min(REDB_MAX);
         let buffers = (cap / 8 / narrow).min(BUFFERS_MAX);
@@ -55,7 +56,7 @@ impl Plan {
         Ok(Self { frames: rest - held, redb, buffers })
     }
 
-    /// An equal share for each of `workers`.
+    /// Returns an equal share for each of `workers`.
     pub fn shared_by(&self, workers: u64) -> Self {
         Self {
             frames: self.frames / workers,
@@ -64,12 +65,12 @@ impl Plan {
         }
     }
 
-    /// For a step that makes no file of pages: what redb would hold of it goes to frames.
+    /// Returns the plan of a step that writes no file of pages: the bytes of redb's write cache go to frames.
     pub fn without_file(self) -> Self {
         Self { frames: self.frames + self.redb, ..self }
     }
 
-    /// How many sub-domains can be meshed at once: a worker needs frames of its own.
+    /// Number of sub-domains meshed at once. It is limited by the threads and by the frames each worker needs.
     pub fn workers(&self) -> usize {
         let by_frames = (self.frames / FRAMES_OF_WORKER).max(1);
         n_threads().min(usize::try_from(by_frames).unwrap_or(usize::MAX))

@@ -1,4 +1,4 @@
-//! What is decided before anything is written: options, sizes and what they predict, the shares of the memory cap.
+//! Decisions before anything is written: options, the size field, the estimate from it, and shares of the memory cap.
 
 pub(super) mod estimate;
 mod forecast;

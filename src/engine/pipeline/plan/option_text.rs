@@ -1,4 +1,4 @@
-//! Options as text: how a job has them on record, and how a file of options and the command line give them.
+//! Options as text: the form recorded with a job and given in option files and on the command line.
 
 use std::fmt;
 
@@ -12,7 +12,8 @@ use tetdb_kernel::boundary::{RegionPolicy, RegionRule};
 use tetdb_kernel::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
 use tetdb_schema::word::Word as _;
 
-/// Options as text, a key for each. Lengths are numbers or `1%` of the box diagonal; shapes and seeds are numbers with commas.
+/// Options as text, one key each. Lengths are numbers or shares of the box diagonal such as `1%`; shapes and seeds are numbers
+/// with commas.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OptionsText {
@@ -40,13 +41,13 @@ pub struct OptionsText {
     /// Sizes of regions.
     #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
     pub size_region: Vec<String>,
-    /// A length as an expression in x, y and z.
+    /// Edge length as an expression in x, y and z.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_expr: Option<String>,
-    /// A file of sizes at the vertices of a mesh, on record with its full path.
+    /// File of sizes at the vertices of a mesh; recorded with its full path.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_field: Option<String>,
-    /// Hash of the files of `size_field`, written by the program.
+    /// Hash of the files of `size_field`; written by the program.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_field_hash: Option<String>,
     /// A word of [`RegionPolicy`].
@@ -57,7 +58,7 @@ pub struct OptionsText {
     /// Points in regions that stay empty.
     #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
     pub hole: Vec<String>,
-    /// Names of regions in the surface's files, written by the program.
+    /// Names of regions from the surface's files; written by the program.
     #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
     pub region_name: Vec<String>,
     /// A word of [`Mode`](tetdb_kernel::optimize::Mode).
@@ -80,7 +81,7 @@ pub struct OptionsText {
 }
 
 impl OptionsText {
-    /// The sizes alone, all else absent.
+    /// Returns the sizes as text; all other options are absent.
     pub fn from_sizes(sizes: &SizeOptions, file: Option<&SizeFile>) -> Self {
         let sources = |option: &str| {
             let of_shape = sizes.sources.iter().filter(|source| source.option() == option);
@@ -102,7 +103,7 @@ impl OptionsText {
         }
     }
 
-    /// These options with those of `other` in their place wherever `other` has any; a list replaces a list.
+    /// Returns these options, each replaced by that of `other` where `other` has it; a list replaces a list.
     pub fn overridden_by(self, other: Self) -> Self {
         let list =
             |own: Vec<String>, other: Vec<String>| if other.is_empty() { own } else { other };
@@ -134,7 +135,7 @@ impl OptionsText {
     /// Parses the sizes.
     ///
     /// # Errors
-    /// The option and the value that make no sense.
+    /// An option has an invalid value; the error names the option and the value.
     pub fn sizes(&self) -> Result<SizeOptions, SizingError> {
         let [hsiz, hmin, hmax, hgrad] =
             [&self.hsiz, &self.hmin, &self.hmax, &self.hgrad].map(|o| o.as_deref());
@@ -153,13 +154,13 @@ impl OptionsText {
         })
     }
 
-    /// The file of sizes, if one is named.
+    /// Returns the file of sizes, if one is named.
     pub fn size_file(&self) -> Option<SizeFile> {
         let path = self.size_field.clone()?;
         Some(SizeFile { path, hash: self.size_field_hash.clone() })
     }
 
-    /// Without a word, seeds or holes mean [`RegionPolicy::Seeds`].
+    /// Parses the rule for regions. Without a policy, seeds or holes imply [`RegionPolicy::Seeds`].
     fn region_rule(&self) -> Result<RegionRule, PipelineError> {
         let bad = |option, text: &str| PipelineError::BadSeed { option, found: text.to_owned() };
         let region =
@@ -250,7 +251,7 @@ fn unknown(option: &'static str, value: &str) -> PipelineError {
     PipelineError::Option { option, value: value.to_owned() }
 }
 
-/// A text, as it would be typed, of a text or a number.
+/// Text of an option, from a text or a number.
 struct Scalar(String);
 
 struct ScalarVisitor;
@@ -285,7 +286,7 @@ impl<'de> Deserialize<'de> for Scalar {
     }
 }
 
-/// A text, as it would be typed, of a text, a number or a list of both.
+/// Text of an option, from a text, a number or a list of both.
 struct Typed(String);
 
 struct TypedVisitor;
@@ -328,12 +329,12 @@ impl<'de> Deserialize<'de> for Typed {
     }
 }
 
-/// One option.
+/// Deserializes one optional option as text.
 fn text<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
     Ok(Option::<Scalar>::deserialize(from)?.map(|Scalar(text)| text))
 }
 
-/// A list of options.
+/// Deserializes a list of options as texts.
 fn texts<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
     let all = Vec::<Typed>::deserialize(from)?;
     Ok(all.into_iter().map(|Typed(text)| text).collect())

@@ -1,4 +1,4 @@
-//! What decides a mesh, and what decides a run.
+//! Options: those that determine the mesh, and those of one run.
 
 use super::Plan;
 use crate::pipeline::work::Hands;
@@ -8,62 +8,63 @@ use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::SizeOptions;
 use tetdb_store::sealed::Form;
 
-/// Sub-domains smaller than this are nearly all refined zone, so none is planned.
+/// Fewest tetrahedra of a planned sub-domain; a smaller one would be almost entirely refined zone.
 const TETS_MIN: f64 = 25_000.0;
 
 /// Options of one run: those that shape the mesh, and those of the run itself.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
-    /// What decides the mesh; on record.
+    /// Options that determine the mesh; the job records them.
     pub mesh: MeshOptions,
-    /// How this run works; not on record.
+    /// Settings of this run; not recorded.
     pub run: RunOptions,
 }
 
-/// What decides the mesh, besides the surface; the job has it on record as [`OptionsText`](super::OptionsText).
+/// Options that, with the surface, determine the mesh. The job records them as [`OptionsText`](super::OptionsText).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshOptions {
     /// Wanted edge lengths.
     pub sizes: SizeOptions,
-    /// Wanted edge lengths in a file.
+    /// File of wanted edge lengths, if any.
     pub size_field: Option<SizeFile>,
-    /// Which regions are filled, and their names.
+    /// The rule for filled regions, and names of regions.
     pub regions: RegionRule,
-    /// How far tetrahedra are improved.
+    /// Extent of the optimization.
     pub optimize: Mode,
-    /// Into how many sub-domains the mesh is divided.
+    /// Number of sub-domains.
     pub subdomains: Subdomains,
-    /// Whether coarse snapshots are dropped, so that sub-domains cannot be meshed again. It does not shape the mesh.
+    /// True to drop coarse snapshots; sub-domains then cannot be remeshed. The mesh does not depend on it.
     pub drop_coarse: bool,
-    /// How finished sub-domains are stored. It does not shape the mesh.
+    /// Storage form of finished sub-domains. The mesh does not depend on it.
     pub seal: Form,
-    /// Whether the meshes before and after each zone is refined are kept to be looked at. The finished mesh is the same.
+    /// True to keep the meshes before and after each zone is refined, for inspection. The finished mesh is the same.
     pub keep_stages: bool,
-    /// Whether the surface's triangles are divided to the wanted lengths first. The store keeps the divided surface.
+    /// True to first divide the surface's triangles to the wanted lengths. The store keeps the divided surface.
     pub refine_surface: bool,
 }
 
 /// A file of wanted edge lengths at the vertices of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SizeFile {
-    /// Its full path, or the name of the copy in the store.
+    /// Full path of the file, or the name of its copy in the store.
     pub path: String,
-    /// Hash of the file and the mesh beside it, 32 hex digits, once they were read: a changed file is noticed.
+    /// Hash of the file and of the mesh next to it, as 32 hex digits; set once they are read. It reveals a changed file.
     pub hash: Option<String>,
 }
 
-/// Into how many sub-domains the mesh is divided.
+/// Number of sub-domains of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Subdomains {
-    /// One up to two million predicted tetrahedra. Above that an even number with at most five million each, in large meshes ten million.
+    /// One for up to two million predicted tetrahedra. Above that, an even number with at most five million each, or ten million
+    /// in large meshes.
     #[default]
     Auto,
-    /// So many, from 1; fewer where they would have less than 25,000 tetrahedra.
+    /// This number, at least 1; fewer if they would have less than 25,000 tetrahedra.
     Exactly(u32),
 }
 
 impl Subdomains {
-    /// The number asked for; `None` for one that follows from the predicted size of the mesh.
+    /// The requested number; `None` if it follows from the predicted size of the mesh.
     pub fn count(self) -> Option<u32> {
         match self {
             Self::Auto => None,
@@ -72,25 +73,25 @@ impl Subdomains {
     }
 }
 
-/// How one run works; nothing of it is on record.
+/// Settings of one run; none is recorded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunOptions {
-    /// Whether the run ends with the coarse mesh and tasks do the rest.
+    /// True if the run ends with the coarse mesh, for tasks to do the rest.
     pub coarse_only: bool,
-    /// Other processes that share the work.
+    /// Remote workers that share the work.
     pub hands: Hands,
-    /// How cuts are chosen, for comparisons. A resumed run cuts as usual.
+    /// Method of choosing cuts, for comparisons. A resumed run uses the default method.
     pub method: Method,
-    /// Settings of tests.
+    /// Settings for tests.
     pub trial: Trial,
 }
 
-/// Settings that make a small mesh a test of what happens to large ones.
+/// Settings with which a small mesh tests the behavior of large ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Trial {
-    /// Allows sub-domains of any size.
+    /// True to allow sub-domains of any size.
     pub subdomains_small: bool,
-    /// Frames and buffers that are no shares of the cap. With very few, pages leave memory and sorts have several runs.
+    /// Frames and buffers to use instead of shares of the cap. With very few, pages leave memory and sorts have several runs.
     pub plan: Option<Plan>,
 }
 

@@ -1,4 +1,5 @@
-//! Sizes of regions, by their numbers, their names or by labels of the triangles around them; and what may not lie outside of all.
+//! Sizes of regions, given by number, by name or by a label of the triangles around them; and checks that no sheet, embedded edge
+//! or embedded point lies outside the filled regions.
 
 use std::collections::BTreeMap;
 
@@ -8,9 +9,9 @@ use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface};
 use tetdb_kernel::boundary::Filled;
 use tetdb_kernel::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError};
 
-/// What `sizes` asks of regions of `domain`, whose volumes have `names`.
+/// Returns the region sizes of `sizes` for `domain`; `names` gives the names of its volumes.
 ///
-/// Errors: a number or label that no filled region has.
+/// Errors: a number, name or label that fits no filled region.
 pub fn region_sizes<'a>(
     domain: &Domain<'a>,
     names: &BTreeMap<u32, String>,
@@ -27,7 +28,8 @@ pub fn region_sizes<'a>(
     sizes.regions.iter().map(one).collect()
 }
 
-/// Whether each volume is meant. A number goes first, then a region's name; `label:` before a name says that it is neither.
+/// Returns for each volume whether `which` means it. A number takes precedence, then a region's name, then a label; the prefix
+/// `label:` rules out the first two.
 fn find(
     domain: &Domain,
     names: &BTreeMap<u32, String>,
@@ -62,7 +64,7 @@ fn find(
 }
 
 fn unknown(which: &str, surface: &Surface, n_regions: usize) -> SizingError {
-    /// Names listed in the message.
+    /// Largest number of names listed in the message.
     const LISTED: usize = 12;
     let names = &surface.label_names;
     let mut list = names[..names.len().min(LISTED)].join(", ");
@@ -77,7 +79,7 @@ fn unknown(which: &str, surface: &Surface, n_regions: usize) -> SizingError {
     }
 }
 
-/// Errors: a sheet, or an edge of a wire, where nothing is filled.
+/// Checks that every sheet and embedded edge is inside. Errors: one lies where nothing is filled.
 pub(super) fn refuse_outer_sheets(
     surface: &Surface,
     volumes: &EnclosedVolumes,
@@ -106,7 +108,7 @@ pub(super) fn refuse_outer_sheets(
     })
 }
 
-/// Errors: a point where nothing is filled.
+/// Checks that every embedded point is inside. Errors: one lies where nothing is filled.
 pub(super) fn refuse_outer_points(
     surface: &Surface,
     seeker: &Seeker,
