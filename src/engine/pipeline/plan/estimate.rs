@@ -213,7 +213,7 @@ fn prepare_in(
     Ok(Prepared { field, sizes, estimate, notes: notes(&chosen, options, volumes.n_volumes - 1) })
 }
 
-/// Returns the filled volumes. Errors: a seed on a triangle; seeds that contradict each other or the rule.
+/// Returns the filled volumes. Errors: a seed on a triangle, outside all volumes, in an empty region, or in conflict with another.
 fn chosen(
     seeker: &Seeker,
     volumes: &EnclosedVolumes,

@@ -13,6 +13,8 @@ pub fn record_recipe(step: &mut Step) {
 }
 
 /// Returns the version with which a store was begun; a store without a recorded version has version 1.
+///
+/// Errors: a damaged catalog.
 pub fn recipe_of(catalog: &mut Catalog) -> Result<u32, StoreError> {
     let bytes = catalog.blob(Blob::Recipe)?;
     Ok(bytes.and_then(|bytes| bytes.try_into().ok()).map_or(1, u32::from_le_bytes))

@@ -1,4 +1,4 @@
-//! Sub-domains of a finished store meshed again, and the way back.
+//! Remeshing of sub-domains of a finished store, and its undo.
 
 mod previous;
 mod request;

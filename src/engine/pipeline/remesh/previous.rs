@@ -1,4 +1,4 @@
-//! The previous version of sub-domains that were meshed again: brought back or dropped.
+//! The previous version of remeshed sub-domains: restore it or drop it.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -12,9 +12,9 @@ use tetdb_schema::blob::Blob;
 use tetdb_schema::catalog::{StoreState, SubdomainRow};
 use tetdb_store::store::{Catalog, Step, StoreError};
 
-/// Brings back what the sub-domains of the last change were before it, in one step.
+/// Restores the sub-domains of the last remeshing to their version before it, in one step.
 ///
-/// Errors: [`PipelineError::NothingToUndo`].
+/// Errors: [`PipelineError::NothingToUndo`]; a damaged catalog; the disk.
 pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
     let clock = Instant::now();
     let before = catalog.previous()?;
@@ -54,7 +54,7 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
     Ok(ResaturateSummary { parts, pages: PagerStats::default(), frames_used: 0 })
 }
 
-/// Drops the previous version; returns of how many sub-domains there was one. Errors: the disk.
+/// Drops the previous version; returns its number of sub-domains. Errors: the disk.
 pub fn forget(catalog: &mut Catalog) -> Result<usize, PipelineError> {
     let before = Previous::of(catalog)?;
     let n = before.rows.len();
@@ -67,14 +67,14 @@ pub fn forget(catalog: &mut Catalog) -> Result<usize, PipelineError> {
     Ok(n)
 }
 
-/// The previous version, and the lengths of its blobs.
+/// The rows of the previous version, and the lengths of its blobs.
 pub struct Previous {
     pub rows: Vec<SubdomainRow>,
     blobs: Vec<(Blob, usize)>,
 }
 
 impl Previous {
-    /// As the catalog has it. Errors: a damaged catalog.
+    /// Reads the previous version from the catalog. Errors: a damaged catalog.
     pub fn of(catalog: &mut Catalog) -> Result<Self, StoreError> {
         let rows = catalog.previous()?;
         let mut blobs = Vec::new();
@@ -88,7 +88,7 @@ impl Previous {
         Ok(Self { rows, blobs })
     }
 
-    /// Forgets it in `step`.
+    /// Drops the previous version in `step`.
     pub fn drop(&self, step: &mut Step) {
         for row in &self.rows {
             step.remove_previous(row.rank);

@@ -1,16 +1,17 @@
-//! Which sub-domains to mesh again, and how.
+//! Request to remesh sub-domains.
 
 use std::collections::BTreeSet;
 
 use super::sizes::NewSizes;
 
-/// What to make again.
+/// Sub-domains to remesh, and their sizes.
 #[derive(Clone, Debug)]
 pub struct Resaturation {
     /// Ranks of the sub-domains.
     pub ranks: BTreeSet<u32>,
-    /// `None`: with the sizes that are recorded.
+    /// New sizes; `None` for the recorded ones.
     pub sizes: Option<NewSizes>,
-    /// The file of each is damaged: it must become what the catalog says it was, and is no previous version.
+    /// True if the file of each sub-domain is damaged. The new mesh must then equal the one recorded in the catalog, and the
+    /// damaged file does not become a previous version.
     pub repair: bool,
 }

@@ -1,7 +1,7 @@
-//! Sub-domains meshed again from their coarse snapshots, each alone; what lies around them stays as it is.
+//! Remeshing of sub-domains from their coarse snapshots, each alone; the mesh around them stays as it is.
 //!
-//! Workers write new files beside the old ones; when all are done, one commit lists the new files and remembers the old as the previous
-//! version. A run that is killed leaves the old mesh or the new one.
+//! Workers write new files next to the old ones. When all are done, one commit lists the new files and keeps the old as the
+//! previous version. A killed run leaves either the old mesh or the new one.
 
 use std::collections::BTreeSet;
 
@@ -16,22 +16,22 @@ use tetdb_base::storage::{Budget, attempt};
 use tetdb_schema::blob::Blob;
 use tetdb_store::store::{Catalog, StoreError};
 
-/// What would be meshed again.
+/// Predicted size of a sub-domain after remeshing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
     /// Rank of the sub-domain.
     pub rank: u32,
-    /// Tetrahedra it has now.
+    /// Number of tetrahedra now.
     pub tets: u64,
-    /// Tetrahedra to expect.
+    /// Predicted number of tetrahedra.
     pub predicted: f64,
 }
 
-/// Meshes sub-domains of a finished store again, in one step.
+/// Remeshes sub-domains of a finished store, in one step.
 ///
-/// The result depends on the store and the sizes alone. Interfaces and all other sub-domains stay as they are. Effects: one commit; the
-/// replaced files stay as the previous version, the one before goes. Errors: a sub-domain that is not there or whose coarse snapshot
-/// was not kept; sizes that make no sense. The store is then as it was.
+/// The result depends on the store and the sizes alone. Interfaces and all other sub-domains stay as they are. Effects: one
+/// commit. The replaced files become the previous version, and the earlier previous version is dropped. Errors: a sub-domain does
+/// not exist or has no coarse snapshot; sizes make no sense. The store is then unchanged.
 pub fn resaturate(
     catalog: &mut Catalog,
     options: &Options,
@@ -46,7 +46,7 @@ pub fn resaturate(
     })?
 }
 
-/// What [`resaturate`] would make, without making it. Errors: as there.
+/// Predicts the sizes that [`resaturate`] would give, without remeshing. Errors: as there.
 pub fn forecast(
     catalog: &mut Catalog,
     options: &Options,
@@ -72,7 +72,7 @@ pub fn forecast(
     })?
 }
 
-/// The sub-domains that `sizes` would make otherwise than they are. Errors: damage; sizes that make no sense.
+/// Returns the sub-domains that `sizes` would change. Errors: damage; sizes that make no sense.
 pub fn changed(
     catalog: &mut Catalog,
     options: &Options,
@@ -92,7 +92,8 @@ pub fn changed(
     Ok(ranks)
 }
 
-/// What was asked for when a sub-domain was last meshed again with other sizes; `None` for one with those of the whole.
+/// Returns the recorded request of the last remeshing of a sub-domain with new sizes; `None` if the sub-domain has the sizes of
+/// the whole.
 ///
 /// Errors: a damaged catalog.
 pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreError> {

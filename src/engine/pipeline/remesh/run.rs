@@ -1,4 +1,4 @@
-//! One run that makes sub-domains again: jobs for workers, then one commit.
+//! One remeshing run: jobs for workers, then one commit.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -30,25 +30,25 @@ use tetdb_store::sealed::SealedError;
 use tetdb_store::sealed::{CoarseSnapshot, Form};
 use tetdb_store::store::{Catalog, StoreError};
 
-/// One run.
+/// State of one remeshing run.
 pub struct RemeshRun<'a> {
     pub catalog: &'a mut Catalog,
     options: &'a Options,
     what: &'a Resaturation,
-    /// Of the whole.
+    /// The recorded size field of the whole mesh.
     pub field: Arc<SizeField>,
-    /// Rows of what is made again, by rank.
+    /// Rows of the sub-domains to remesh, by rank.
     rows: Vec<(SubdomainRow, CoarseRow)>,
     /// The latest generation of each sub-domain's files.
     last: BTreeMap<u32, u32>,
-    /// Steps on record: with their number no generation is given twice, also not that of a file that was undone, which a reader may
-    /// still look for.
+    /// Number of recorded steps. New generations depend on it, so that none occurs twice, not even that of a file that was
+    /// undone. A reader may still look for such a file.
     steps: u32,
     n: u32,
     clock: Instant,
 }
 
-/// A sub-domain to be made again.
+/// Job that remeshes one sub-domain.
 struct RemeshJob {
     subdomain: SubdomainJob,
     kept: CoarseRow,
@@ -119,7 +119,7 @@ impl<'a> RemeshRun<'a> {
         })
     }
 
-    /// The field of each sub-domain that is made again; `None` for that of the whole.
+    /// Returns the field of each remeshed sub-domain; `None` for that of the whole.
     pub fn fields(
         &mut self,
         budget: &Budget,
@@ -151,9 +151,10 @@ impl<'a> RemeshRun<'a> {
         Ok(fields)
     }
 
-    /// What it takes to build one field after the other, beside the arrays that go to scratch files where they are too large.
+    /// Bytes for building the fields one after another, besides the arrays, which go to scratch files if they are too large.
     fn field_bytes(&self, values: Option<&Values>) -> u64 {
-        /// Bytes of a point of the skin, with its size and its place in lists; of a face; of a leaf of the octree while it is built.
+        /// Bytes per point of the skin, with its size and its places in lists; per face; per leaf of the octree while it is
+        /// built.
         const POINT: u64 = 24 + 40;
         const FACE: u64 = 12;
         const LEAF: u64 = 16;
@@ -171,7 +172,7 @@ impl<'a> RemeshRun<'a> {
         self.field.bytes() as u64 + most + values.map_or(0, Values::bytes)
     }
 
-    /// Refuses lengths that are not one for each.
+    /// Checks the number of lengths. Errors: not one for each tetrahedron or vertex.
     fn count(&self, values: &Values) -> Result<(), PipelineError> {
         let tets: u64 = self.rows.iter().map(|(row, _)| row.tets).sum();
         let vertices = match &self.rows[..] {
@@ -197,7 +198,7 @@ impl<'a> RemeshRun<'a> {
         let of = |field: &SizeField| field.bytes() as u64;
         let own: u64 = fields.values().flatten().map(of).sum();
         let asked = self.what.sizes.as_ref().and_then(|s| s.field.as_ref());
-        // Those of the sub-domains are held as bytes, too, until they are committed.
+        // The fields of the sub-domains are also held as bytes until they are committed.
         let made: BTreeMap<u32, Vec<u8>> = (fields.iter())
             .filter_map(|(&rank, field)| Some((rank, field.as_ref()?.to_bytes())))
             .filter(|_| self.what.sizes.is_some())
@@ -243,7 +244,7 @@ impl<'a> RemeshRun<'a> {
             let table: FaceOwners = read_blob(self.catalog, Blob::FaceOwners(cut))?;
             owners.insert(cut, table.across(rank));
         }
-        // The faces of cuts stay; with sizes of its own a sub-domain may be refined up to them.
+        // Interface faces stay. A sub-domain with a field of its own may be refined up to them.
         let zones = match field {
             Some(_) => Vec::new(),
             None => tree::zones_above(self.catalog, mesh.ranks, self.n)?,
@@ -260,7 +261,7 @@ impl<'a> RemeshRun<'a> {
             base: self.catalog.coarse_path(rank, kept.generation),
             sealed: self.catalog.file_path(rank, generation),
             generation,
-            // As it was.
+            // The storage form stays.
             form: Form::from_state(row.state).unwrap_or_default(),
             field,
             kept: None,
@@ -281,7 +282,8 @@ impl<'a> RemeshRun<'a> {
         let mut is_new = self.what.repair;
         for (row, _) in &self.rows {
             let (rank, sealed) = (row.rank, &finished[&row.rank].sealed);
-            // The faces of cuts stay whatever is wanted, and a repair is to give all that was there: else the coarse snapshot is another one.
+            // Interface faces stay under any sizes, and a repair must restore the whole sub-domain. Otherwise the coarse snapshot
+            // is a different one.
             let has_other_faces = sealed.row.interface_digest != row.interface_digest;
             if has_other_faces || self.what.repair && sealed.row.digest != row.digest {
                 return Err(StoreError::Sealed(SealedError::Content {
@@ -354,7 +356,7 @@ impl<'a> RemeshRun<'a> {
         Ok(self.summary(finished))
     }
 
-    /// Nothing has changed: what was made is dropped, and the version before the last change stays to be brought back.
+    /// Handles an unchanged result: drops the new files. The version before the last change can still be restored.
     fn leave(
         &mut self,
         mut finished: BTreeMap<u32, FinishedSubdomain>,
@@ -362,7 +364,7 @@ impl<'a> RemeshRun<'a> {
         for (row, _) in &self.rows {
             let subdomain = finished.get_mut(&row.rank).expect("made for each");
             let path = self.catalog.file_path(row.rank, subdomain.sealed.row.generation);
-            // It is not listed: what stays is removed by the next writer.
+            // The file is not listed, so the next writer removes it if this removal fails.
             let _ = path.remove_file();
             subdomain.sealed.row = row.clone();
         }
@@ -371,7 +373,7 @@ impl<'a> RemeshRun<'a> {
 
     fn summary(&self, finished: BTreeMap<u32, FinishedSubdomain>) -> ResaturateSummary {
         if let Ok(scratch) = self.catalog.scratch_dir() {
-            // Nothing in it counts.
+            // The scratch folder has no data of the store.
             let _ = scratch.remove_dir_all();
         }
         let mut summary =
@@ -389,9 +391,9 @@ impl<'a> RemeshRun<'a> {
     }
 }
 
-/// What is left of the budget, for arrays of size fields.
+/// Scratch space with the remaining budget, for arrays of size fields.
 pub(super) fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, PipelineError> {
-    // A store that is only read may be one that can only be read.
+    // A store without the writer's lock may be on a read-only disk.
     let folder = match catalog.lock() {
         Some(_) => catalog.scratch_dir()?,
         None => std::env::temp_dir().into(),
@@ -399,7 +401,7 @@ pub(super) fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, P
     Ok(ScratchSpace::new(budget.available(), folder))
 }
 
-/// The recorded field of the whole.
+/// Reads the recorded size field of the whole mesh.
 pub fn recorded_field(
     catalog: &mut Catalog,
     options: &Options,

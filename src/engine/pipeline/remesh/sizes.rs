@@ -1,4 +1,4 @@
-//! Sizes for sub-domains that are made again.
+//! Size fields of remeshed sub-domains.
 
 use crate::pipeline::error::PipelineError;
 use tetdb_schema::blob::Blob;
@@ -11,19 +11,19 @@ use tetdb_kernel::sizing::{
     BackgroundMesh, SizeConstraint, SizeField, SizingError, TETS_PER_LOAD, load_of_tet,
 };
 
-/// Sizes that differ by less than this share are the same to `--changed`: where a field is divided differently its values
-/// between the same wishes are off by so much.
+/// Relative difference below which sizes count as equal for `--changed`. Where two fields have different cells, their values
+/// between equal constraints differ by this much.
 const SAME: f64 = 0.05;
 
-/// Fields of different options that differ by less than this share are the same: where nothing new is wanted they differ by rounding.
+/// Relative difference below which fields of different options count as equal. With equal constraints they differ by rounding.
 const UNCHANGED: f64 = 1e-5;
 
-/// Lengths one by one.
+/// Wanted lengths given one by one.
 #[derive(Clone, Debug)]
 pub enum Values {
-    /// For each tetrahedron of the sub-domains that are made again, by rank, each in its sealed order.
+    /// One per tetrahedron of the remeshed sub-domains, by rank, each in its sealed order.
     Tets(Vec<f64>),
-    /// For each vertex of the only sub-domain that is made again, in its sealed order.
+    /// One per vertex of the only remeshed sub-domain, in its sealed order.
     Vertices(Vec<f64>),
 }
 
@@ -35,35 +35,35 @@ impl Values {
     }
 }
 
-/// What takes the place of recorded sizes.
+/// Sizes that replace the recorded ones.
 #[derive(Clone, Debug)]
 pub struct NewSizes {
-    /// A field of the whole surface; without it, what is recorded of each sub-domain.
+    /// A field for the whole surface; `None` for the recorded field of each sub-domain.
     pub field: Option<SizeField>,
-    /// Lengths one by one, in place of a field.
+    /// Lengths given one by one, in place of a field.
     pub values: Option<Values>,
-    /// Times this.
+    /// Factor for all lengths.
     pub factor: f64,
-    /// No length of `values` is taken below or above these.
+    /// Least and greatest length; `values` are clamped to them.
     pub limits: [f64; 2],
-    /// Slope with which lengths grow from the faces that stay.
+    /// Slope with which lengths grow from the fixed faces.
     pub beta: f64,
-    /// What was asked for, in words to be recorded.
+    /// Text of the request, to be recorded.
     pub asked: String,
 }
 
-/// Lengths that are wanted of a sub-domain.
+/// Wanted lengths of a sub-domain.
 struct Wanted<'a> {
-    /// What it was last made with.
+    /// The field with which the sub-domain was last meshed.
     had: &'a SizeField,
-    /// The field of the whole surface it would have been made with, and that of the options asked for now.
+    /// The recorded field of the whole surface and the field of the new options.
     fields: Option<[&'a SizeField; 2]>,
-    /// Times this.
+    /// Factor for all lengths.
     factor: f64,
 }
 
 impl SizeConstraint for Wanted<'_> {
-    /// What the sub-domain has holds where the options asked for say nothing else than those of the first run.
+    /// Returns the length of the sub-domain's field, except where the new options change the field of the whole surface.
     fn h(&self, p: Point) -> Result<f64, SizingError> {
         let h = match self.fields.map(|fields| fields.map(|field| field.h(p))) {
             Some([whole, new]) if (new - whole).abs() > UNCHANGED * whole => new,
@@ -75,7 +75,7 @@ impl SizeConstraint for Wanted<'_> {
     fn divides(&self, middle: Point, width: f64) -> Option<bool> {
         let new = self.fields.map(|[_, new]| new);
         let answers = [Some(self.had), new].map(|field| field?.divides(middle, width));
-        // Where lengths of one field end and those of the other begin, their values alone tell.
+        // Where lengths change from one field to the other, only their values decide.
         match (answers, self.fields) {
             ([Some(true), _] | [_, Some(true)], _) => Some(true),
             (_, Some([whole, _])) if !std::ptr::eq(self.had, whole) => None,
@@ -85,15 +85,15 @@ impl SizeConstraint for Wanted<'_> {
     }
 }
 
-/// Fields as the catalog has them.
+/// Size fields as recorded in the catalog.
 pub struct Recorded<'a> {
     pub whole: &'a SizeField,
-    /// For arrays of fields, and for those that are built.
+    /// Scratch space for arrays of fields, and for fields that are built.
     pub room: &'a ScratchSpace,
 }
 
 impl Recorded<'_> {
-    /// The field a sub-domain was last made with, if it is its own.
+    /// Returns the field with which a sub-domain was last meshed, if it has one of its own.
     pub fn own(
         &self,
         catalog: &mut Catalog,
@@ -105,11 +105,12 @@ impl Recorded<'_> {
         }
     }
 
-    /// The field with which `rank` is to be made, `None` for that of the whole. `from`: where its lengths begin in those given one by one.
+    /// Builds the field with which `rank` is to be remeshed; `None` for the field of the whole. `from` is the index of its first
+    /// length in lengths given one by one.
     ///
-    /// Where nothing else is wanted than what it has, that is its field, to the bit.
+    /// If the constraint equals the current lengths, the result equals the current field bit for bit.
     ///
-    /// Errors: lengths that are not as many as there should be; sizes that make no sense; damage.
+    /// Errors: a wrong number of lengths; sizes that make no sense; damage.
     pub fn build_new(
         &self,
         catalog: &mut Catalog,
@@ -145,7 +146,7 @@ impl Recorded<'_> {
         }
     }
 
-    /// Whether a sub-domain would be made with other sizes than it was: by more than [`SAME`] at some vertex.
+    /// Returns true if the new sizes of a sub-domain differ from its current ones by more than [`SAME`] at some vertex.
     pub fn differs(
         &self,
         catalog: &mut Catalog,
@@ -153,13 +154,13 @@ impl Recorded<'_> {
         sizes: &NewSizes,
         memory: u64,
     ) -> Result<bool, PipelineError> {
-        // What was asked for last time and is asked for again changes nothing, however it came out.
+        // A repeated request changes nothing, whatever mesh it gave the first time.
         let asked = catalog.blob(Blob::Request(rank))?;
         if sizes.factor == 1.0 && asked.as_deref() == Some(sizes.asked.as_bytes()) {
             return Ok(false);
         }
         let own = self.own(catalog, rank)?;
-        // Of a sub-domain with a field of its own, what near its skin is made of both is compared.
+        // A sub-domain with a field of its own blends both fields near its skin, so the blended field is compared.
         let made;
         let wanted;
         let (old, new): (&SizeField, &dyn SizeConstraint) = match &own {
@@ -187,7 +188,8 @@ impl Recorded<'_> {
     }
 }
 
-/// Tetrahedra to expect of a sub-domain made with `field`: so many times those it has as its load is larger.
+/// Predicted number of tetrahedra of a sub-domain meshed with `new`: its current number times the ratio of the loads
+/// under `new` and `old`.
 pub fn predicted(
     catalog: &mut Catalog,
     rank: u32,
@@ -208,12 +210,12 @@ pub fn predicted(
             }
         }
     }
-    // A part of which next to nothing is load is all skin.
+    // A sub-domain with a load close to zero consists of its skin alone.
     let ratio = loads[1].max(1.0 / TETS_PER_LOAD) / loads[0].max(1.0 / TETS_PER_LOAD);
     Ok(tets * ratio)
 }
 
-/// Lengths given one by one as a mesh of them; those of tetrahedra become means at vertices.
+/// Turns lengths given one by one into a background mesh; lengths of tetrahedra become means at vertices.
 fn on_mesh(
     catalog: &mut Catalog,
     rank: u32,
@@ -245,7 +247,7 @@ fn on_mesh(
                     *sum = (sum.0 + length(h), sum.1 + 1);
                 }
             }
-            // A vertex without a tetrahedron lies where no point is asked for.
+            // A vertex without a tetrahedron lies where the size of no point is evaluated.
             let mean = |&(sum, n): &(f64, u32)| if n > 0 { sum / f64::from(n) } else { 1.0 };
             sums.iter().map(mean).collect()
         }
@@ -253,7 +255,7 @@ fn on_mesh(
     Ok(BackgroundMesh::new(points, tets, h))
 }
 
-/// The faces of a sub-domain that stay: input triangles and interface faces, as triangles that index points.
+/// Returns the fixed faces of a sub-domain: input triangles and interface faces, as triangles that index the returned points.
 fn skin(
     catalog: &mut Catalog,
     rank: u32,

@@ -1,27 +1,27 @@
-//! What a run did, by rank.
+//! Report of a remeshing run.
 
 use crate::pipeline::work::FineReport;
 use tetdb_base::storage::PagerStats;
 use tetdb_schema::catalog::SubdomainRow;
 
-/// A sub-domain before and after.
+/// Rows of a sub-domain before and after remeshing.
 #[derive(Clone, Debug)]
 pub struct Remade {
     /// Its row in the catalog before the run.
     pub before: SubdomainRow,
     /// Its row in the catalog after the run.
     pub after: SubdomainRow,
-    /// `None` where an older version came back.
+    /// Report of the fine step; `None` if an older version was restored.
     pub fine: Option<FineReport>,
 }
 
-/// What a run did, by rank.
+/// Report of a remeshing run.
 #[derive(Clone, Debug, Default)]
 pub struct ResaturateSummary {
-    /// The sub-domains that were meshed again.
+    /// The changed sub-domains, by rank.
     pub parts: Vec<Remade>,
     /// Pages read and written.
     pub pages: PagerStats,
-    /// Most pages held in memory at once.
+    /// Largest number of pages held in memory at once.
     pub frames_used: usize,
 }

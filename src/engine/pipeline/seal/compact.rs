@@ -1,9 +1,9 @@
-//! Seal a finished working mesh: renumber along the Hilbert curve, drop neighbors, compress.
+//! Seals a finished working mesh: renumbers it along the Hilbert curve, drops neighbors and compresses.
 //!
-//! Everything is a stream or an external sort, so a mesh of any size passes through a small lease:
-//! 1. vertices sorted along the curve; their places become their numbers (a scratch map holds old → new);
-//! 2. tetrahedra sorted by their new numbers, smallest vertex first, which follows the curve too;
-//! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
+//! Every stage is a stream or an external sort, so a mesh of any size passes through a small lease:
+//! 1. vertices are sorted along the curve; their places become their numbers (a scratch map holds old → new);
+//! 2. tetrahedra are sorted by their new numbers, smallest vertex first, which also follows the curve;
+//! 3. their required faces are sorted by vertices and joined with the facets, which gives each facet its tetrahedra.
 
 use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::page::{NONE, RECORDS};
@@ -21,7 +21,9 @@ use tetdb_kernel::mesh::anatomy::FACES;
 use tetdb_kernel::mesh::{Mesh, Scan, VertexTag, dense, scan_parts, tets_of_page};
 use tetdb_store::sealed::{Form, Sealed, SealedWriter, sorted_face};
 
-/// Writes `mesh` to `target`, in the order and under the numbers of a sealed sub-domain whatever the form. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
+/// Writes `mesh` to `target`, with the order and numbers of a sealed sub-domain in every storage form.
+///
+/// Invariant: `tet_of` is right for all vertices. Effects: the mesh's scratch map is overwritten and cleared.
 pub fn seal<P: Pages>(
     mesh: &mut Mesh<P>,
     target: &SealTarget,
@@ -61,7 +63,7 @@ fn vertices<P: Pages>(
     let frame = HilbertFrame::new(&target.bounds);
     let mut sorter = Sorter::new(target.scratch, target.memory / 4);
     for v in mesh.vertex_ids() {
-        // A surface vertex between two empty regions has no tetrahedron, but its facets are listed.
+        // A surface vertex between two empty regions has no tetrahedron, but its facets are still written.
         if mesh.tet_of(v) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
             continue;
         }
@@ -95,7 +97,7 @@ fn vertices<P: Pages>(
     Ok(())
 }
 
-/// Pages looked at before what was found goes to the sorter: 4 MB of tetrahedra.
+/// Pages scanned before their records go to the sorter: 4 MB of tetrahedra.
 const BATCH: usize = 64;
 
 fn sort_tets<P: Pages>(
@@ -113,7 +115,7 @@ fn sort_tets<P: Pages>(
     Ok(sorter.finish()?)
 }
 
-/// The tetrahedra of a page under their new numbers.
+/// Scan that returns the tetrahedra of a page under their new numbers.
 struct Records;
 
 impl Scan for Records {
@@ -196,9 +198,10 @@ fn facets<P: Pages>(
         sorter.push(claim(vertices, n, true))?;
     }
     let mut faces = faces.peekable();
-    // A face may be both a facet and an interface face: what was read stays at hand.
+    // A face may be both a facet and an interface face, so the tetrahedra read for it are kept for the next record.
     let (mut at, mut sides) = ([0; 3], [NONE; 2]);
-    // Facets of a wall given from both sides: each names the tetrahedron behind it, so both keep their labels.
+    // A wall may be given from both sides, as two facets. Each refers only to the tetrahedron behind it, so both keep their
+    // labels.
     let is_pair = |a: &InputFace, b: &InputFace| {
         a.vertices == b.vertices && !a.at_interface && !b.at_interface
     };
@@ -217,7 +220,7 @@ fn facets<P: Pages>(
                 }
             }
         }
-        // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
+        // The tetrahedron behind a facet has the face in the facet's orientation, the one in front in the opposite.
         let odd = usize::from(claim.odd);
         let next = all.peek().and_then(|next| next.as_ref().ok());
         let has_twin = [last.as_ref(), next].into_iter().flatten().any(|c| is_pair(c, &claim));

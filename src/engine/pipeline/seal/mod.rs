@@ -1,4 +1,4 @@
-//! A finished working mesh becomes a sealed file; what sealed files sum up to.
+//! Sealing: writes a finished working mesh as a sealed file, and sums the totals of sealed files.
 
 pub(super) mod compact;
 mod neighbors;

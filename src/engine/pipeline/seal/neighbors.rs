@@ -1,4 +1,4 @@
-//! Neighbors of tetrahedra that have just got new numbers: faces sorted by vertices and matched, then sorted back.
+//! Neighbors of renumbered tetrahedra: faces are sorted by vertices and matched, and the matches are sorted by tetrahedron.
 
 use tetdb_schema::page::NONE;
 
@@ -9,15 +9,15 @@ use tetdb_base::storage::{Sorted, Sorter, check_cancelled};
 use tetdb_kernel::mesh::anatomy::FACES;
 use tetdb_store::sealed::sorted_face;
 
-/// The four neighbors of each tetrahedron in turn.
+/// Stream of the four neighbors of each tetrahedron, in order.
 pub struct Neighbors {
-    /// Of every face with another side.
+    /// A link for every face with a tetrahedron on its other side.
     links: std::iter::Peekable<Sorted<NeighborLink>>,
     tet: u32,
 }
 
 impl Neighbors {
-    /// Of tetrahedra in their new order. Errors: the disk.
+    /// Finds the neighbors of tetrahedra in their new order. Errors: the disk.
     pub fn of(order: Sorted<TetRecord>, target: &SealTarget) -> Result<Self, PipelineError> {
         let memory = target.memory / 4;
         let mut faces = Sorter::new(target.scratch, memory);
@@ -48,7 +48,7 @@ impl Neighbors {
         Ok(Self { links: links.finish()?.peekable(), tet: 0 })
     }
 
-    /// Those of the next tetrahedron. Errors: the disk.
+    /// Returns the neighbors of the next tetrahedron. Errors: the disk.
     pub fn next(&mut self) -> Result<[u32; 4], PipelineError> {
         let mut four = [NONE; 4];
         let tet = self.tet;
@@ -77,7 +77,7 @@ mod tests {
     use tetdb_store::sealed::Form;
     use tetdb_store::store::Catalog;
 
-    /// Pages kept as they are worked with are a working mesh.
+    /// A sub-domain stored as pages opens as a working mesh.
     #[test]
     fn kept_pages_open_as_a_working_mesh() -> Result<(), Box<dyn std::error::Error>> {
         let dir = tempfile::tempdir()?;

@@ -1,11 +1,11 @@
-//! Records that are sorted while a sub-domain is sealed.
+//! Sort records of sealing.
 
 use tetdb_base::storage::sort_record;
 
 sort_record! {
-    /// A tetrahedron by its new numbers.
+    /// A tetrahedron under its new numbers.
     pub struct TetRecord {
-        /// Rotated: the least comes first.
+        /// Rotated so that the least comes first.
         pub nodes: [u32; 4],
         pub region: u32,
         pub flags: u32,
@@ -33,7 +33,7 @@ sort_record! {
         pub number: u32,
         /// True if the ascending order is odd in the facet or interface face.
         pub odd: bool,
-        /// An interface face, not a facet.
+        /// True for an interface face, false for a facet.
         pub at_interface: bool,
     }
 }

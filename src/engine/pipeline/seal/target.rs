@@ -1,4 +1,4 @@
-//! Where a sealed sub-domain goes, and with what means.
+//! Destination and resources of a sealed sub-domain.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use tetdb_base::storage::DiskPath;
 use tetdb_schema::topology::FacesAcross;
 use tetdb_store::sealed::Form;
 
-/// Where and how to seal.
+/// Destination and resources of a sealed sub-domain.
 pub struct SealTarget<'a> {
     pub path: &'a DiskPath,
     pub form: Form,
     pub scratch: &'a DiskPath,
     pub subdomain: SubdomainId,
     pub generation: u32,
-    /// Bytes for sort runs and for the writer together.
+    /// Bytes for sort runs and the writer together.
     pub memory: u64,
     pub bounds: Aabb,
-    /// Owners of the other side of its interface faces, by cut; without owners, interface faces are left out.
+    /// Owners of the other side of the sub-domain's interface faces, by cut; `None` leaves interface faces out.
     pub owners: Option<&'a BTreeMap<u32, FacesAcross>>,
 }

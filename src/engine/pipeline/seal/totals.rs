@@ -1,4 +1,4 @@
-//! Regions and interfaces of the whole mesh, summed over its sub-domains; rows of the journal.
+//! Regions and interfaces of the whole mesh, summed over its sub-domains; and rows of the journal.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -23,7 +23,7 @@ pub struct Totals {
     pub interfaces: BTreeMap<u32, Vec<InterfaceRow>>,
 }
 
-/// The whole from the totals of all `n` sub-domains; those in `changed` go first.
+/// Sums the totals of all `n` sub-domains; those in `changed` replace the recorded ones.
 pub fn sum_totals(
     catalog: &mut Catalog,
     n: u32,
@@ -49,7 +49,7 @@ pub fn sum_totals(
             row.tets += here.tets;
             row.volume += here.volume;
         }
-        // The lower side counts; verification compares it with the other.
+        // Only the side with the lower rank counts; verification compares it with the other.
         for side in totals.interfaces.iter().filter(|s| rank < s.other) {
             interfaces.entry(side.cut).or_default().push(InterfaceRow {
                 cut: side.cut,
@@ -63,7 +63,7 @@ pub fn sum_totals(
     Ok(Totals { regions, interfaces })
 }
 
-/// A row of the journal for a step that began at `clock`.
+/// Row of the journal for a step that began at `clock`.
 pub fn journal(
     state: StoreState,
     step: &str,
