@@ -1,4 +1,4 @@
-//! The folder of tasks: names, and files that are there as a whole or not at all.
+//! The folder of tasks: its names, and file writes that complete or leave no file.
 
 use std::io::{Read, Write};
 use std::path::Path;
@@ -10,12 +10,12 @@ use tetdb_base::storage::{DiskPath, StorageError, check_cancelled, host_name};
 use tetdb_schema::archive::Archivable;
 use tetdb_schema::work::{PlanRecord, TaskMark, WorkKind, body, from_bytes, head, to_bytes};
 
-/// Between two looks for a file that is late.
+/// Pause between two checks for a late file.
 const LOOK_AGAIN: Duration = Duration::from_millis(250);
 /// Bytes copied at once.
 const COPY: usize = 1 << 20;
 
-/// Until when a file that is not there may only be late: other machines see new names after a while.
+/// Deadline for a missing file, which may only be late: other machines see new names after a delay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Patience(Option<Instant>);
 
@@ -24,7 +24,7 @@ impl Patience {
         Self(Instant::now().checked_add(wait))
     }
 
-    /// Waits a little; `false` when the time is over.
+    /// Waits a little; returns false once the deadline has passed.
     fn goes_on(self) -> bool {
         check_cancelled();
         let left = self.0.and_then(|end| end.checked_duration_since(Instant::now()));
@@ -34,7 +34,7 @@ impl Patience {
         })
     }
 
-    /// What `look` finds, at last.
+    /// Calls `look` until it finds something or the deadline passes.
     pub fn until<T>(
         self,
         mut look: impl FnMut() -> Result<Option<T>, StorageError>,
@@ -48,7 +48,7 @@ impl Patience {
     }
 }
 
-/// A name that no other process gives, here or elsewhere.
+/// Returns a name that no other process on any machine uses.
 pub(super) fn attempt_name() -> String {
     let host: String =
         host_name().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
@@ -92,12 +92,12 @@ impl TaskFolder {
         self.dir.join(format!("task-{task:05}.mark"))
     }
 
-    /// Where the files of an attempt are.
+    /// Folder of the files of an attempt.
     pub fn files_dir(&self, attempt: &str) -> DiskPath {
         self.dir.join(format!("files-{attempt}"))
     }
 
-    /// The plan. Errors: there is none for this version; damage.
+    /// Reads the plan. Errors: no plan of this recipe version; damage.
     pub fn plan(&self, patience: Patience) -> Result<PlanRecord, PipelineError> {
         let path = self.plan_path();
         let no_plan = |reason: String| PipelineError::NoPlan {
@@ -117,7 +117,7 @@ impl TaskFolder {
         }
     }
 
-    /// The number of the stage that is being done; 0 where nothing says so.
+    /// Number of the current stage; 0 if none is recorded.
     pub fn stage(&self) -> Result<usize, StorageError> {
         let bytes = read(&self.stage_path())?.unwrap_or_default();
         let text = String::from_utf8_lossy(&bytes);
@@ -134,7 +134,7 @@ impl TaskFolder {
         write(&self.mark_path(task), &[&text])
     }
 
-    /// The size field's bytes. Errors: in words what is wrong with them.
+    /// Reads the bytes of the size field. Errors: the file is missing or damaged, with the fault in words.
     pub fn field(&self, patience: Patience) -> Result<Vec<u8>, PipelineError> {
         let path = self.field_path();
         let mut bytes =
@@ -149,12 +149,12 @@ impl TaskFolder {
     }
 }
 
-/// A file of the folder that cannot be used.
+/// Error for a file of the folder that cannot be used.
 pub(super) fn damaged(path: &DiskPath, what: &str) -> PipelineError {
     PipelineError::TaskFile { path: path.path().to_owned(), what: what.to_owned() }
 }
 
-/// All of a file; `None` where there is none.
+/// Reads a whole file; `None` if it does not exist.
 pub(super) fn read(path: &DiskPath) -> Result<Option<Vec<u8>>, StorageError> {
     if !path.is_file() {
         return Ok(None);
@@ -168,7 +168,7 @@ pub(super) fn read(path: &DiskPath) -> Result<Option<Vec<u8>>, StorageError> {
     }
 }
 
-/// A record of a file; `None` where there is none. Errors: in words what is wrong with it.
+/// Reads the record of a file; `None` if the file does not exist. The inner error is the fault of the record, in words.
 pub(super) fn read_record<T: Archivable>(
     path: &DiskPath,
     kind: WorkKind,
@@ -176,7 +176,7 @@ pub(super) fn read_record<T: Archivable>(
     Ok(read(path)?.map(|bytes| from_bytes(kind, &bytes)))
 }
 
-/// Writes a file as a whole.
+/// Writes a file completely or not at all.
 pub(super) fn write(path: &DiskPath, bytes: &[&[u8]]) -> Result<(), StorageError> {
     let draft = draft_of(path);
     let written = (|| {
@@ -195,7 +195,7 @@ pub(super) fn write_record(
     write(path, &[&to_bytes(kind, record)])
 }
 
-/// Copies a file, which may be on another disk.
+/// Copies a file, also to another disk.
 pub(super) fn copy(from: &DiskPath, to: &DiskPath) -> Result<(), StorageError> {
     let draft = draft_of(to);
     let mut source =
@@ -234,7 +234,7 @@ fn end_draft(
     done
 }
 
-/// Where a process of this machine keeps what only it reads.
+/// Folder for files that only this process reads.
 pub(super) fn scratch_in(dir: &Path, attempt: &str) -> DiskPath {
     DiskPath::from(dir).join(format!("tetdb-{attempt}"))
 }

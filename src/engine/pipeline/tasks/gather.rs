@@ -1,4 +1,4 @@
-//! The side of the tasks that has the store's lock: orders are written, receipts committed.
+//! Tasks, on the side that holds the store's lock: writes orders and commits receipts.
 
 use std::collections::BTreeSet;
 use std::hash::{BuildHasher, RandomState};
@@ -23,33 +23,34 @@ use tetdb_schema::work::{
 };
 use tetdb_store::store::{Catalog, StoreError};
 
-/// What a call of [`gather`] found and did.
+/// Result of a call of [`gather`].
 #[derive(Clone, Debug, Default)]
 pub struct Gathered {
     /// Tasks whose receipts were committed.
     pub committed: Vec<u32>,
-    /// Tasks of the stage that have nothing to commit, and why.
+    /// Tasks of the stage without anything to commit, and the reason.
     pub left: Vec<(u32, String)>,
-    /// Whether these have just got their orders: the stage before is complete.
+    /// True if the tasks of the stage have just received their orders, because the previous stage is complete.
     pub is_new_stage: bool,
-    /// The number of the stage, from 0, and how many there are.
+    /// Number of the stage, from 0, and number of stages.
     pub stage: [usize; 2],
     /// Tasks of the stage.
     pub tasks: Range<u32>,
-    /// Whether all is done and the store sealed.
+    /// True if all tasks are done and the store is sealed.
     pub is_finished: bool,
 }
 
 impl Gathered {
-    /// Whether tasks of the stage were begun before: what is left of them has failed, or is not done yet.
+    /// True if the tasks of the stage had orders before this call: each remaining one has failed or is not done yet.
     pub fn is_begun(&self) -> bool {
         !self.is_new_stage
     }
 }
 
-/// Plans the rest of an unfinished store, whose coarse mesh is there, for about `tasks` tasks at once. The same plan again changes nothing.
+/// Plans the remaining work of an unfinished store with a coarse mesh, for about `tasks` tasks at once. Repeating a plan changes
+/// nothing.
 ///
-/// `options` are those of the job, as JSON. Errors: no coarse mesh, or nothing left to do; the disk.
+/// `options` are the job's options as JSON. Errors: no coarse mesh; nothing left to do; a task of another plan at work; the disk.
 pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), PipelineError> {
     attempt(|| {
         let folder = TaskFolder::of(catalog.work_dir());
@@ -83,7 +84,7 @@ pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), Pipe
                 let writer = format!("task {task} on {host}");
                 return Err(StoreError::Busy { path, writer }.into());
             }
-            // What its tasks have done is not lost; what they still do does not count.
+            // Finished tasks of the old plan are committed; results of its other tasks no longer count.
             gather(catalog, Duration::ZERO)?;
             plan.run = RandomState::new().hash_one(old.run);
         }
@@ -98,9 +99,9 @@ pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), Pipe
     })?
 }
 
-/// Commits what tasks have done, and gives orders to those that can begin; seals the store when nothing is left.
+/// Commits the results of tasks and writes orders for the next ones; seals the store when nothing is left.
 ///
-/// A file that is not there is looked for during `wait`. Errors: no plan; the disk. What is committed stays so.
+/// `wait` is how long to look for missing files. Errors: no plan; the disk. Commits before the error stay.
 pub fn gather(catalog: &mut Catalog, wait: Duration) -> Result<Gathered, PipelineError> {
     attempt(|| {
         let folder = TaskFolder::of(catalog.work_dir());
@@ -132,7 +133,7 @@ impl GatherRun<'_> {
             let open = self.open_tasks(stage)?;
             gathered.is_new_stage = open.iter().all(|&t| !self.folder.orders_path(t).exists());
             for task in open {
-                // Nothing can be late of a task that never had orders.
+                // A task without orders cannot have late receipts.
                 let has_orders = self.folder.orders_path(task).exists();
                 match self.receipts(task, has_orders)? {
                     Ok(receipts) => {
@@ -155,7 +156,7 @@ impl GatherRun<'_> {
         Ok(gathered)
     }
 
-    /// Tasks of a stage that are not committed.
+    /// Returns the tasks of a stage that are not committed.
     fn open_tasks(&mut self, stage: &Stage) -> Result<Vec<u32>, PipelineError> {
         let parts = tree::subtrees(self.catalog, self.plan.n)?;
         let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
@@ -168,7 +169,7 @@ impl GatherRun<'_> {
         Ok(tasks.filter(|(_, part)| is_open(**part)).map(|(task, _)| task).collect())
     }
 
-    /// What a task has done, its files at hand; else why nothing can be committed.
+    /// Returns the receipts of a task if all its files are present; otherwise the reason why nothing can be committed.
     fn receipts(
         &self,
         task: u32,
@@ -199,7 +200,7 @@ impl GatherRun<'_> {
         Ok(Ok(receipts))
     }
 
-    /// Gives the files of a task their place, and commits what it did.
+    /// Links or copies the files of a task to their place in the store, and commits its receipts.
     fn commit(&mut self, done: TaskReceipts) -> Result<(), PipelineError> {
         let from = self.folder.files_dir(&done.attempt);
         let store = self.folder.dir.folder();
@@ -209,7 +210,7 @@ impl GatherRun<'_> {
         let coarse = coarse.iter().map(|c| Catalog::coarse_name(c.rank, c.generation));
         let listed: BTreeSet<String> = files.chain(coarse).collect();
         for (name, _) in &done.files {
-            // One that counts already is not touched: this part of the task was committed before.
+            // A listed file is not touched: an earlier commit included this part of the task.
             if !listed.contains(name) {
                 place(&from.join(name), &store.join(name))?;
             }
@@ -226,14 +227,14 @@ impl GatherRun<'_> {
         for sub in subdomains.iter().filter(|sub| !sealed.contains(&sub.row.rank)) {
             commit_subdomain(self.catalog, sub)?;
         }
-        // What remains in it are other names of files that count now.
+        // The folder only has second names of files that are now in the store.
         from.remove_dir_all()?;
         self.folder.receipts_path(done.task).remove_file()?;
         self.folder.mark_path(done.task).remove_file()?;
         Ok(())
     }
 
-    /// Errors: cuts of parts that are not there.
+    /// Commits cuts. Errors: the store lacks the subtree that they cut.
     fn commit_new_cuts(&mut self, cuts: Vec<CutReceipt>, task: u32) -> Result<(), PipelineError> {
         let Some(top) = cuts.first() else {
             return Ok(());
@@ -276,13 +277,14 @@ impl GatherRun<'_> {
     }
 }
 
-/// Parts within another that are to be cut.
+/// Returns the subtrees within `part` that are still to be cut.
 fn wide_within(parts: &[SubtreeMesh], part: RankRange) -> impl Iterator<Item = &SubtreeMesh> {
     let within = part.ranks();
     (parts.iter()).filter(move |p| p.ranks.count > 1 && within.contains(&p.ranks.first))
 }
 
-/// Gives a file a second name, so that nothing is lost if the commit does not follow. Where a disk knows no second names it is copied.
+/// Gives a file a second name, so that it is not lost if the commit does not follow. The file is copied where the disk has no
+/// hard links.
 fn place(from: &DiskPath, to: &DiskPath) -> Result<(), StorageError> {
     to.remove_file()?;
     match from.link(to) {
@@ -291,7 +293,7 @@ fn place(from: &DiskPath, to: &DiskPath) -> Result<(), StorageError> {
     }
 }
 
-/// For whoever goes on without tasks: what they have done is committed, the plan is dropped. Whether there was one.
+/// Commits the finished tasks and drops the plan, for a run that continues without tasks. Returns true if there was a plan.
 ///
 /// Errors: the disk.
 pub fn end_plan(catalog: &mut Catalog) -> Result<bool, PipelineError> {

@@ -1,19 +1,20 @@
-//! A mesh by tasks that a batch scheduler starts: any machine, any order, as often as it likes.
+//! Meshing by tasks that a batch scheduler starts, on any machine, in any order and any number of times.
 //!
-//! Beside the mesh the store has a folder `work` with everything that tasks and the process with the store's lock say to each other:
+//! The folder `work` of the store has all files that tasks exchange with the process that holds the store's lock:
 //!
-//! | file | by | what |
+//! | file | written by | content |
 //! |---|---|---|
-//! | `plan` | [`plan`] | how many tasks, and what is the same for all |
+//! | `plan` | [`plan`] | number of tasks, and parameters common to all |
 //! | `size-field` | [`plan`] | the size field |
 //! | `stage` | [`gather`] | the number of the first stage that is not committed, in digits |
-//! | `task-00017.orders` | [`gather`] | what task 17 is to do |
-//! | `task-00017.mark` | the task | who is at it, renewed while it lives; what went wrong |
-//! | `files-ATTEMPT/` | the task | the files it wrote, under the names they will have |
-//! | `task-00017.receipts` | the task | what it did, after its files |
+//! | `task-00017.orders` | [`gather`] | orders of task 17 |
+//! | `task-00017.mark` | the task | host and process of the task, renewed while it lives; its error |
+//! | `files-ATTEMPT/` | the task | the files it wrote, under their final names |
+//! | `task-00017.receipts` | the task | its receipts, written after its files |
 //!
-//! A task writes names that no other attempt at the same task writes, and only [`gather`] gives files their place in the store, one commit a
-//! receipt. So a task that is done twice, or killed anywhere, changes nothing. Files are written under other names, synced and renamed.
+//! Each attempt at a task writes its files to a folder of its own. Only [`gather`] links or copies files to their place in the store.
+//! It commits all cuts of a task at once, and each sub-domain by itself. So a task that runs twice, or is killed at any point, changes
+//! nothing. Files are written under temporary names, synced and renamed.
 
 mod folder;
 mod gather;

@@ -1,4 +1,4 @@
-//! One task, on whatever machine: orders in, files and receipts out.
+//! One task on any machine: reads orders, writes files and receipts.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -25,31 +25,31 @@ use tetdb_schema::work::{
 };
 use tetdb_store::store::Catalog;
 
-/// Between two marks that a task lives.
+/// Interval between two renewals of a task's mark.
 const RENEWED_EVERY: Duration = Duration::from_secs(5);
 
-/// How a task works; none of it changes the mesh.
+/// Settings of a task; the mesh does not depend on them.
 #[derive(Clone, Debug)]
 pub struct TaskSettings {
-    /// A folder of this machine for what is being written; `None`: beside the store.
+    /// Local folder for files being written; `None` for the store's folder of tasks.
     pub scratch: Option<PathBuf>,
     /// How long a file may be late.
     pub wait: Duration,
 }
 
-/// What became of a task.
+/// Outcome of a task.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Performed {
-    /// So many cuts or sub-domains are done.
+    /// Number of cuts or sub-domains done.
     Done(usize),
-    /// It had been done before.
+    /// An earlier attempt had completed the task.
     Already,
 }
 
-/// Does task `task` of the store at `store`, and never opens its catalog.
+/// Performs task `task` of the store at `store`, without opening its catalog.
 ///
-/// Effects: new files in the store's folder of tasks. Errors: no plan, or one whose stage has not come; those of the mesher. A task that is
-/// killed or fails can be done again.
+/// Effects: new files in the store's folder of tasks. Errors: no plan; a stage that has not begun; those of the mesher. A task
+/// that is killed or fails can be performed once more.
 pub fn perform(
     store: &Path,
     task: u32,
@@ -78,7 +78,7 @@ pub fn perform(
             Ok(_) => folder.mark_path(task).remove_file()?,
             Err(error) => {
                 let error = Some(error.to_string());
-                // The error itself is what counts.
+                // A failed write of the mark must not hide the error itself.
                 let _ = folder.set_mark(task, &TaskMark { error, ..is_alive });
             }
         }
@@ -86,7 +86,7 @@ pub fn perform(
     })?
 }
 
-/// Whether there are receipts of this plan for the task, with their files.
+/// True if the task has receipts of this plan, and their files exist.
 fn is_done(folder: &TaskFolder, plan: &PlanRecord, task: u32) -> Result<bool, StorageError> {
     let found = read_record::<TaskReceipts>(&folder.receipts_path(task), WorkKind::Receipts)?;
     Ok(found.is_some_and(|found| {
@@ -108,7 +108,7 @@ fn orders_of(
     let path = folder.orders_path(task);
     let found = patience.until(|| {
         let found = read_record::<TaskOrders>(&path, WorkKind::Orders)?;
-        // Those of an earlier plan are as good as none.
+        // Orders of an earlier plan do not count.
         Ok(found.filter(|found| found.as_ref().map_or(true, |orders| orders.run == plan.run)))
     })?;
     let orders = found.ok_or_else(|| PipelineError::NoPlan {
@@ -122,7 +122,7 @@ fn orders_of(
     }
 }
 
-/// Does `work` and says all the while that it is alive.
+/// Runs `work`, and meanwhile renews the mark that shows that the task is alive.
 fn marked<T>(folder: &TaskFolder, task: u32, mark: &TaskMark, work: impl FnOnce() -> T) -> T {
     std::thread::scope(|scope| {
         let (stop, stopped) = channel::<()>();
@@ -130,7 +130,7 @@ fn marked<T>(folder: &TaskFolder, task: u32, mark: &TaskMark, work: impl FnOnce(
             loop {
                 let now = SystemTime::now().duration_since(UNIX_EPOCH);
                 let renewed = now.unwrap_or_default().as_secs();
-                // For others to look at: the work goes on without it.
+                // The mark only informs other processes, so the work continues if a write fails.
                 let _ = folder.set_mark(task, &TaskMark { renewed, ..mark.clone() });
                 if stopped.recv_timeout(RENEWED_EVERY) != Err(RecvTimeoutError::Timeout) {
                     return;
@@ -142,7 +142,7 @@ fn marked<T>(folder: &TaskFolder, task: u32, mark: &TaskMark, work: impl FnOnce(
     })
 }
 
-/// What an order did, and the zones above it where the cuts below it belong to the task.
+/// The receipt of an order, and the zones above the order if the task also performs the cuts below it.
 type Below = (Option<Vec<CutPlane>>, Receipt);
 
 /// One attempt at a task.
@@ -151,9 +151,9 @@ struct Attempt<'a> {
     folder: &'a TaskFolder,
     plan: &'a PlanRecord,
     orders: TaskOrders,
-    /// Where its files are in the end.
+    /// Final folder of the attempt's files.
     files: DiskPath,
-    /// Where everything is until then, when that is elsewhere.
+    /// Local folder for all files until the end, if there is one.
     local: Option<DiskPath>,
 }
 
@@ -189,7 +189,7 @@ impl<'a> Attempt<'a> {
             scratch.create_dir_all()?;
             self.files.create_dir_all()?;
             let receipts = self.receipts(output, &scratch, patience, budget, watch)?;
-            // Empty by now, or of no use to anybody.
+            // The scratch folder is empty by now, or nothing in it is of use.
             scratch.remove_dir_all()?;
             let n = receipts.len();
             let record = TaskReceipts {
@@ -212,7 +212,7 @@ impl<'a> Attempt<'a> {
         done
     }
 
-    /// Does all orders.
+    /// Performs all orders.
     fn receipts(
         &self,
         output: &DiskPath,
@@ -243,7 +243,7 @@ impl<'a> Attempt<'a> {
         self.wait_for_inputs(patience)?;
         let orders = &self.orders.orders;
         let at_once = |n: usize| share.shared_by(share.workers().min(n).max(1) as u64);
-        // One part alone has all the memory: its children come when it is done.
+        // A single subtree gets all the memory: its children are cut only after it is done.
         let (first, later) = (at_once(orders.len()), at_once(usize::MAX));
         let jobs = orders.iter().rev().map(|order| (order.clone(), first));
         let mut receipts = Vec::new();
@@ -261,7 +261,7 @@ impl<'a> Attempt<'a> {
             &mut |(zones, receipt)| {
                 let mut next = Vec::new();
                 if let (Some(zones), Receipt::Cut(cut)) = (zones, &receipt) {
-                    // What is in the store stays; only what this attempt wrote and has cut since is of no use any more.
+                    // Files of the store stay. A file that this attempt wrote and has cut since is no longer needed.
                     let parent = Catalog::file_name(cut.parent.ranks.first, cut.parent.generation);
                     output.join(parent).remove_file()?;
                     next.extend(cut.below(&zones).map(|order| (WorkOrder::Cut(order), later)));
@@ -278,7 +278,7 @@ impl<'a> Attempt<'a> {
         Ok(receipts)
     }
 
-    /// Files of orders that this machine does not see yet.
+    /// Waits for input files of the orders that this machine does not see yet.
     fn wait_for_inputs(&self, patience: Patience) -> Result<(), PipelineError> {
         let store = self.folder.dir.folder();
         for order in &self.orders.orders {
@@ -291,7 +291,7 @@ impl<'a> Attempt<'a> {
         Ok(())
     }
 
-    /// Makes all files last where everybody finds them; their names and lengths.
+    /// Writes all files durably to the store's folder of tasks; returns their names and lengths.
     fn deliver(
         &self,
         output: &DiskPath,

@@ -1,46 +1,46 @@
-//! Which task does what: it follows from the number of sub-domains and of tasks alone.
+//! Assignment of work to tasks; it depends on the numbers of sub-domains and tasks alone.
 
 use tetdb_schema::tree::RankRange;
 
-/// Most tasks of one stage: batch schedulers have arrays of 1,000 by default.
+/// Largest number of tasks in one stage: batch schedulers have arrays of 1,000 by default.
 pub const TASKS_MAX: u32 = 1000;
 
-/// What the tasks of a stage do.
+/// The kind of work of a stage's tasks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StageKind {
-    /// One cut each: the top of the tree, where there are fewer parts than tasks.
+    /// One cut per task, at the top of the tree, where there are fewer subtrees than tasks.
     Cuts,
-    /// All cuts of a part.
+    /// All cuts of a subtree.
     Subtrees,
     /// Sub-domains.
     Subdomains,
 }
 
-/// Tasks that need nothing of each other, but all of the stages before.
+/// Tasks that depend on all earlier stages, but not on each other.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stage {
-    /// What they do.
+    /// The kind of work.
     pub kind: StageKind,
-    /// Number of the first task; numbers go on from stage to stage, from 1.
+    /// Number of the first task. Tasks are numbered through all stages, from 1.
     pub first: u32,
-    /// What each of them does it to.
+    /// The subtree, or range of sub-domains, of each task.
     pub parts: Vec<RankRange>,
 }
 
 impl Stage {
-    /// Numbers of its tasks.
+    /// Numbers of the stage's tasks.
     pub fn tasks(&self) -> std::ops::Range<u32> {
         self.first..self.first + self.parts.len() as u32
     }
 
-    /// The part of a task of this stage.
+    /// Returns the subtree, or range of sub-domains, of a task of this stage.
     pub fn part(&self, task: u32) -> Option<RankRange> {
         let at = task.checked_sub(self.first)?;
         self.parts.get(at as usize).copied()
     }
 }
 
-/// The stages of a mesh of `n` sub-domains for about `tasks` tasks at once.
+/// Returns the stages of a mesh of `n` sub-domains for about `tasks` tasks at once.
 pub fn stages(n: u32, tasks: u32) -> Vec<Stage> {
     let tasks = tasks.clamp(1, TASKS_MAX);
     let mut stages: Vec<Stage> = Vec::new();

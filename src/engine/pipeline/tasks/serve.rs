@@ -1,4 +1,4 @@
-//! Orders and receipts as messages: this process does orders of one that holds the store's lock.
+//! Orders and receipts as messages: one process holds the store's lock, and others perform its orders.
 
 use std::path::Path;
 use std::sync::mpsc::channel;
@@ -21,10 +21,11 @@ use tetdb_schema::blob::Blob;
 use tetdb_schema::work::{Receipt, RunRecord, WorkKind, WorkOrder, from_bytes, to_bytes};
 use tetdb_store::store::Catalog;
 
-/// How long files of other machines may be late.
+/// Longest wait for late files of other machines.
 const WAIT: Duration = Duration::from_secs(60);
 
-/// Begins with helpers; how many orders they do at once. Effects: the size field is in the store's folder of tasks. Errors: the disk; theirs.
+/// Starts the remote workers; returns the number of orders they perform at once. Effects: writes the size field to the store's
+/// folder of tasks. Errors: the disk; those of the remote workers.
 pub fn begin(
     helpers: &dyn Helpers,
     catalog: &mut Catalog,
@@ -45,7 +46,8 @@ pub fn begin(
     Ok(helpers.begin(&to_bytes(WorkKind::Plan, &run))?)
 }
 
-/// Has an order done by a helper; its files are there then. Errors: theirs; a receipt that cannot be read.
+/// Sends an order to a remote worker; returns its receipt once the written files are visible. Errors: those of the remote worker;
+/// a receipt that cannot be read; a missing file.
 pub fn ask(
     helpers: &dyn Helpers,
     slot: usize,
@@ -62,7 +64,7 @@ pub fn ask(
     Ok(receipt)
 }
 
-/// A helper that answers something else than it was asked for.
+/// Error for a receipt of another kind than its order.
 pub fn wrong_receipt() -> PipelineError {
     PipelineError::Helper(RemoteFailure {
         code: Code::Internal,
@@ -75,9 +77,11 @@ fn wait_for(path: &DiskPath, patience: Patience) -> Result<(), PipelineError> {
     found.ok_or_else(|| damaged(path, "it is missing"))
 }
 
-/// Does orders of `job` until `next` has none, as many at once as `started` is given; each order's receipt or error goes to `answer`.
+/// Performs orders of `job` until `next` returns `None`. It calls `started` once, with the number of orders it performs at once,
+/// and `answer` with the receipt or error of each order.
 ///
-/// Shape: `next` gives the slot that is to do an order, below the number given to `started`. Errors: of the beginning.
+/// Shape: `next` returns an order and the slot that performs it; slots are below the number passed to `started`. Errors: a failed
+/// start.
 pub fn serve(
     job: &[u8],
     settings: &TaskSettings,
@@ -166,7 +170,7 @@ pub fn serve(
             })
             .collect();
         while let Some((slot, order)) = next() {
-            // A slot that is gone has answered with the reason.
+            // A slot that has ended has answered with the reason.
             let _ = orders[slot % slots].send(order);
         }
     });

@@ -1,4 +1,4 @@
-//! How far tasks are, for whoever looks.
+//! Progress of the tasks of a store.
 
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -10,48 +10,48 @@ use tetdb_base::storage::{StorageError, is_process_gone};
 use tetdb_schema::work::{TaskMark, TaskReceipts, WorkKind};
 use tetdb_store::store::Catalog;
 
-/// A task that has not said for so long that it lives is taken for dead: twelve times what it takes to say so.
+/// Seconds without a renewed mark after which a task counts as dead: twelve renewal intervals.
 const SILENT: u64 = 60;
 
-/// What a task is at.
+/// State of a task.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TaskState {
-    /// It has not begun.
+    /// The task has not begun.
     Waiting,
-    /// Somebody is at it.
+    /// The task is running.
     Running {
-        /// Where.
+        /// Host of the task.
         host: String,
     },
-    /// It ended without a receipt, and has to be done again.
+    /// The task ended without a usable receipt and must be performed once more.
     Failed {
-        /// Where and why.
+        /// Host, if known, and reason.
         why: String,
     },
-    /// It took so many seconds, and waits to be gathered.
+    /// The task is done, and its receipts can be gathered.
     Done {
-        /// Wall time.
+        /// Wall time of the task.
         seconds: f64,
     },
 }
 
-/// The plan of a store and how far its tasks are.
+/// The plan of a store, and the progress of its tasks.
 #[derive(Clone, Debug)]
 pub struct Planned {
-    /// Sub-domains.
+    /// Number of sub-domains.
     pub subdomains: u32,
-    /// Tasks at once, as asked for.
+    /// Requested number of tasks at once.
     pub tasks: u32,
     /// All stages, in order.
     pub stages: Vec<Stage>,
-    /// The number of the stage that is being done, from 0.
+    /// Number of the current stage, from 0.
     pub stage: usize,
-    /// Its tasks by number.
+    /// States of the current stage's tasks that have orders, by task number.
     pub states: Vec<(u32, TaskState)>,
 }
 
 impl Planned {
-    /// How many tasks are done, running, failed and waiting.
+    /// Numbers of tasks that are done, running, failed and waiting.
     pub fn counts(&self) -> [usize; 4] {
         let mut counts = [0; 4];
         for (_, state) in &self.states {
@@ -65,7 +65,7 @@ impl Planned {
         counts
     }
 
-    /// Mean seconds of the tasks of this stage that are done; `None` while there is none.
+    /// Mean seconds of the finished tasks of this stage; `None` while there is none.
     pub fn seconds_mean(&self) -> Option<f64> {
         let seconds = self.states.iter().filter_map(|(_, state)| match state {
             TaskState::Done { seconds } => Some(*seconds),
@@ -76,10 +76,11 @@ impl Planned {
     }
 }
 
-/// How far the tasks of the store at `store` are; `None` where none are planned. Nothing is changed, and the catalog is not opened.
+/// Returns the progress of the tasks of the store at `store`; `None` if no tasks are planned. Effects: none; the catalog is not
+/// opened.
 pub fn status(store: &Path) -> Result<Option<Planned>, PipelineError> {
     let folder = TaskFolder::of(Catalog::work_dir_at(store));
-    // Of a finished store it is about to go.
+    // The folder of a finished store is about to be removed.
     if !folder.plan_path().exists() {
         return Ok(None);
     }
@@ -87,7 +88,7 @@ pub fn status(store: &Path) -> Result<Option<Planned>, PipelineError> {
     let stages = stages(plan.n, plan.tasks);
     let stage = folder.stage()?;
     let range = stages.get(stage).map_or(0..0, Stage::tasks);
-    // Those without orders have been committed.
+    // Tasks without orders have been committed.
     let open = range.filter(|&task| folder.orders_path(task).exists());
     let states = open.map(|task| Ok((task, state(&folder, plan.run, task)?)));
     Ok(Some(Planned {
@@ -128,7 +129,7 @@ fn is_alive(mark: &TaskMark) -> bool {
         && !is_process_gone(&mark.host, mark.process)
 }
 
-/// Whether a task of the store at `store` is at work; its number and where.
+/// Returns the number and host of a task of the store at `store` that is running, if there is one.
 pub fn is_being_worked(store: &Path) -> Result<Option<(u32, String)>, PipelineError> {
     let running = |(task, state)| match state {
         TaskState::Running { host } => Some((task, host)),
