@@ -1,11 +1,11 @@
-//! Fewer triangles that look the same: vertices that share a cell of a grid become one.
+//! Simplification of triangles: vertices in the same cell of a grid are joined.
 //!
-//! The grid is as fine as can be at first. When more triangles than allowed are left, cells grow by a quarter, and so on:
-//! any number of triangles passes through a table of fixed size, and the result depends on their order alone. A joined vertex
-//! lies where the planes of its triangles meet best, so that edges stay sharp and walls flat.
+//! The grid starts as fine as possible. When the number of triangles exceeds the limit, cells grow by a quarter until few enough
+//! remain. So any number of triangles passes through a table of fixed size, and the result depends on their order alone. A joined
+//! vertex lies where the planes of its triangles meet best, so edges stay sharp and walls flat.
 //!
-//! Sources: J. Rossignac and P. Borrel, "Multi-resolution 3D approximations for rendering complex scenes" (1993);
-//! P. Lindstrom, "Out-of-core simplification of large polygonal models" (2000).
+//! Sources: J. Rossignac and P. Borrel, "Multi-resolution 3D approximations for rendering complex scenes" (1993); P. Lindstrom,
+//! "Out-of-core simplification of large polygonal models" (2000).
 
 use std::collections::hash_map::Entry;
 
@@ -13,25 +13,27 @@ use glam::{DMat3, DVec3};
 
 use tetdb_base::geom::{Aabb, IdMap, IdSet, Point};
 
-/// Cells along an axis at first, as a power of two: no two vertices that can be told apart on a screen share one.
+/// Bits of the initial number of cells along an axis: no two vertices that a screen can separate share a cell.
 const BITS: u32 = 21;
-/// Cells grow to this share of the mean edge when they first grow, and then by this factor.
+/// When cells first grow, they start from this share of the mean edge; each growth multiplies them by `GROWTH`.
 const FIRST: f64 = 0.5;
 const GROWTH: f64 = 1.25;
-/// After a join so large a share of the triangles allowed is left, or cells grow further.
+/// Share of the allowed triangles that may remain after a join; above it, cells grow further.
 const LEFT: f64 = 0.9;
-/// Weight of the mean of a cell's vertices beside the planes of its triangles: where these leave it open, the mean decides.
+/// Weight of the mean of a cell's vertices relative to the planes of its triangles. The mean decides where the planes leave a
+/// freedom.
 const TO_MEAN: f64 = 1e-3;
-/// Bytes a triangle takes while it is here, with its vertices.
+/// Bytes of a triangle in the table, with its vertices.
 pub(super) const TRIANGLE_BYTES: u64 = 150;
 
-/// Vertices in one cell. Lengths are shares of the longest side of the box.
+/// The vertices of one cell. Lengths are shares of the longest side of the box.
 #[derive(Clone, Copy)]
 struct ClusterCell {
-    /// Sum of the positions, and how many they are.
+    /// Sum of the positions, and their number.
     sum: Point,
     n: u32,
-    /// Sums over the triangles of the normal n (its length the area) times itself (xx xy xz yy yz zz), and of n times its distance from the origin.
+    /// Sums over the triangles, with n the normal whose length is twice the area: n times itself (xx xy xz yy yz zz), and n times
+    /// n·p for a point p of the triangle.
     planes: [f32; 6],
     offsets: [f32; 3],
 }
@@ -49,7 +51,7 @@ impl ClusterCell {
         own.zip(others).for_each(|(a, b)| *a += b);
     }
 
-    /// The point nearest to the planes of the triangles, but not farther from the mean than `cell`.
+    /// Returns the point nearest to the planes of the triangles, or the mean if that point is farther from it than `cell`.
     fn best(&self, cell: f64) -> Point {
         let mean = self.mean();
         let [xx, xy, xz, yy, yz, zz] = self.planes.map(f64::from);
@@ -65,7 +67,7 @@ impl ClusterCell {
     }
 }
 
-/// Triangles with the values of each.
+/// Triangles with a value each.
 ///
 /// Shape: `triangles[i]` = places in `points`; `tags[i]` runs parallel to it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,21 +78,21 @@ pub struct Patch<T> {
     pub triangles: Vec<[u32; 3]>,
     /// Value of each triangle.
     pub tags: Vec<T>,
-    /// Side of the cells vertices were joined in; 0 where none were.
+    /// Side of the cells in which vertices were joined; 0 if none were.
     pub cell: f64,
-    /// Triangles given.
+    /// Number of input triangles.
     pub of: u64,
 }
 
-/// A patch under way.
+/// A patch under construction.
 pub(super) struct Cluster<T> {
     low: Point,
     side: f64,
-    /// Side of a cell, and whether any were joined.
+    /// Side of a cell; `is_joined` is true once vertices were joined.
     cell: f64,
     is_joined: bool,
     most: usize,
-    /// A cell's place is its number.
+    /// Cells by number.
     cells: Vec<ClusterCell>,
     numbers: IdMap<u64, u32>,
     triangles: Vec<[u32; 3]>,
@@ -100,7 +102,7 @@ pub(super) struct Cluster<T> {
 }
 
 impl<T: Copy> Cluster<T> {
-    /// For at most `most` triangles within `bounds`.
+    /// Creates a table for at most `most` triangles within `bounds`.
     pub fn new(bounds: &Aabb, most: usize) -> Self {
         let side = (bounds.high - bounds.low).max_element();
         Self {
@@ -118,7 +120,7 @@ impl<T: Copy> Cluster<T> {
         }
     }
 
-    /// Adds a triangle; of those that become equal the first stays.
+    /// Adds a triangle. Of triangles that become equal, the first stays.
     pub fn push(&mut self, corners: [Point; 3], tag: T) {
         self.of += 1;
         let corners = corners.map(|p| (p - self.low) / self.side);
@@ -147,7 +149,7 @@ impl<T: Copy> Cluster<T> {
         a != b && b != c && c != a && self.seen.insert(sorted)
     }
 
-    /// Adds vertices to the cell their mean is in.
+    /// Adds vertices to the cell of their mean; returns the number of the cell.
     fn number(&mut self, vertices: &ClusterCell) -> u32 {
         let at = (vertices.mean() / self.cell).to_array();
         let last = f64::from((1u32 << BITS) - 1);
@@ -165,7 +167,7 @@ impl<T: Copy> Cluster<T> {
         }
     }
 
-    /// Lets cells grow until there is room again.
+    /// Lets cells grow until few enough triangles remain.
     fn join(&mut self) {
         if !self.is_joined {
             self.is_joined = true;
@@ -199,7 +201,7 @@ impl<T: Copy> Cluster<T> {
         }
     }
 
-    /// The triangles in the order they came, vertices numbered by their first use.
+    /// Returns the triangles in the order of their input, with vertices numbered by first use.
     pub fn finish(self) -> Patch<T> {
         let mut places = vec![u32::MAX; self.cells.len()];
         let mut points = Vec::new();
@@ -237,7 +239,7 @@ mod tests {
         Aabb { low: Point::ZERO, high: Point::ONE }
     }
 
-    /// The unit square of `n` by `n` squares, two triangles each.
+    /// The unit square as `n` by `n` squares of two triangles each.
     fn square(n: u32, most: usize) -> Patch<u32> {
         let mut cluster = Cluster::new(&unit(), most);
         let at = |i: u32, j: u32| {

@@ -1,7 +1,7 @@
-//! What a person looks at: cuts by a plane, surfaces, statistics of all tetrahedra, pictures and the page.
+//! Views of a mesh: sections and crinkle cuts, surfaces, statistics of all tetrahedra, pictures and the HTML page.
 //!
-//! Reading order: `section` (cuts by a plane, to be drawn) and `shell` (surfaces); `sample` (edges) and `statistics`;
-//! `cluster` (fewer triangles) and `scene` (surfaces to be turned and cut); `picture` (PNG and SVG) and `page` (HTML).
+//! Reading order: `section` (cuts by a plane, to be drawn) and `shell` (surfaces); `sample` (edges) and `statistics`; `cluster`
+//! (fewer triangles) and `scene` (surfaces to be turned and cut); `picture` (PNG and SVG) and `page` (HTML).
 
 mod cluster;
 pub mod page;

@@ -1,4 +1,4 @@
-//! Coarse snapshots: what a sub-domain is meshed from is kept, so that it can be meshed again.
+//! Coarse snapshots: the mesh before the fine step of a sub-domain, kept so that the sub-domain can be remeshed.
 
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::{Backing, DiskPath, Pager, Pages, check_cancelled};
@@ -8,10 +8,10 @@ use tetdb_store::sealed::SealedError;
 use tetdb_store::sealed::{CoarseSnapshot, CoarseWriter};
 use tetdb_store::store::StoreError;
 
-/// What readers of surfaces refuse, for signs would not be exact.
+/// Coordinates from this magnitude on are refused, as by the readers of surfaces: signs would not be exact.
 const COORDINATE_MAX: f64 = 1e30;
 
-/// Writes the working mesh of sub-domain `rank`, which has no gaps, to `path`. Errors: the disk.
+/// Writes the working mesh of sub-domain `rank`, whose ids have no gaps, to `path`. Errors: ids with gaps; the disk.
 pub fn save<P: Pages>(
     mesh: &mut Mesh<P>,
     path: &DiskPath,
@@ -20,7 +20,7 @@ pub fn save<P: Pages>(
     memory: u64,
 ) -> Result<CoarseRow, PipelineError> {
     if !mesh.is_dense() {
-        // Cuts leave none.
+        // Cuts leave no gaps.
         return Err(PipelineError::from(SealedError::Content {
             path: path.path().to_owned(),
             subdomain: rank,
@@ -46,9 +46,9 @@ pub fn save<P: Pages>(
     Ok(writer.finish()?)
 }
 
-/// Opens a kept mesh as it was: the same ids, in the same order.
+/// Opens the mesh of a snapshot with the same ids, in the same order.
 ///
-/// Not restored are sizes and `tet_of`, which the fine step sets anew. Errors: damage; the disk.
+/// Sizes and `tet_of` are not restored; the fine step sets them. Errors: damage; the disk.
 pub fn reopen(
     snapshot: &mut CoarseSnapshot,
     backing: Backing,
@@ -194,7 +194,7 @@ mod tests {
         }
     }
 
-    /// Whoever knows the format can write a snapshot whose sums are right: flips must not meet what is no mesh.
+    /// A forged snapshot can have correct checksums: flips must not run on tetrahedra that are no mesh.
     #[test]
     fn tetrahedra_that_are_no_mesh_are_damage() {
         let dir = tempfile::tempdir().expect("a temporary folder");

@@ -1,4 +1,4 @@
-//! One bisection: the file of a subtree in, the files of its two children out.
+//! One bisection: reads the file of a subtree and writes the files of its two children.
 
 use std::time::Instant;
 
@@ -22,32 +22,32 @@ use tetdb_schema::work::{CutOrder, CutReceipt, InheritedFace};
 /// The bisection of a subtree.
 pub struct CutJob<'a> {
     pub order: &'a CutOrder,
-    /// The file of the subtree, and those of its children.
+    /// File of the subtree, and files of its children.
     pub base: DiskPath,
     pub written: [DiskPath; 2],
-    /// Where meshes on their way go, when they are kept.
+    /// Folder of the intermediate meshes, if they are kept.
     pub output: &'a DiskPath,
     pub scratch: DiskPath,
-    /// Zones of the cuts above it.
+    /// Zones of the cuts above the subtree.
     pub zones: Vec<Zone>,
     pub common: Common<'a>,
     pub share: Plan,
 }
 
-/// A child as its file holds it.
+/// A child subtree as stored in its file.
 struct Child {
     mesh: SubtreeMesh,
-    /// Interface faces it took over from its parent.
+    /// Interface faces inherited from the parent.
     inherited: Vec<InheritedFace>,
 }
 
 impl CutJob<'_> {
-    /// Does the whole job; a failed page access ends here.
+    /// Performs the cut. A failed page access unwinds to here.
     pub fn run(self, watch: &Watcher) -> Result<(CutReceipt, CutReport), PipelineError> {
         let place = (&self.base, self.order.parent.ranks.first);
         let divide = || panic_is_damage_of(place, || self.open(), || self.divide(watch));
         let divided = attempt(divide)??;
-        // Empty by now; thousands of cuts would leave as many folders.
+        // The folder is empty by now, and thousands of cuts would leave as many folders.
         let _ = self.scratch.remove_dir_all();
         Ok(divided)
     }
@@ -121,7 +121,7 @@ impl CutJob<'_> {
         Ok((receipt, opened.report))
     }
 
-    /// The mesh of the subtree as its file holds it.
+    /// Opens the mesh of the subtree from its file.
     fn open(&self) -> Result<Mesh, PipelineError> {
         let parent = self.order.parent;
         let backing = self.backing(parent.ranks.first, None, 2);
@@ -166,7 +166,7 @@ impl CutJob<'_> {
         Ok((child, stats))
     }
 
-    /// Where pages go that leave memory, with one part in `share` of redb's cache.
+    /// Backing for pages that leave memory, with 1/`share` of redb's cache.
     fn backing(&self, subdomain: u32, made: Option<DiskPath>, share: u64) -> Backing {
         Backing {
             subdomain,

@@ -1,4 +1,4 @@
-//! The row of the journal for a cut.
+//! The journal row of a cut.
 
 use std::time::Instant;
 
@@ -7,7 +7,7 @@ use tetdb_base::storage::PagerStats;
 use tetdb_kernel::bisect::CutReport;
 use tetdb_schema::catalog::{JournalRow, StoreState};
 
-/// A cut as its row of the journal describes it.
+/// The data of a cut for its journal row.
 pub struct CutJournal<'a> {
     pub cut: u32,
     /// The child on the low side.
@@ -18,7 +18,7 @@ pub struct CutJournal<'a> {
 }
 
 impl CutJournal<'_> {
-    /// The row of a cut that began at `clock`.
+    /// Returns the row of a cut that began at `clock`.
     pub fn row(&self, clock: Instant) -> JournalRow {
         let (report, interface) = (self.report, &self.report.interface);
         let (natural, chosen) = (&interface.natural, &interface.chosen);

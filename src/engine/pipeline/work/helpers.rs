@@ -1,19 +1,20 @@
-//! Other processes that do orders of this run, by messages.
+//! Remote workers: other processes that perform orders of this run, by messages.
 
 use std::fmt;
 use std::sync::Arc;
 
 use tetdb_base::storage::RemoteFailure;
 
-/// Processes that do orders while this one holds the store's lock; how bytes come to them is theirs to know.
+/// Processes that perform orders while this one holds the store's lock. The implementation transports the bytes.
 pub trait Helpers: Send + Sync {
-    /// Says what is the same for all orders; how many they do at once, all together. Errors: in words.
+    /// Sends the parameters common to all orders; returns how many orders the workers perform at once, in total. Errors: a
+    /// failure, in words.
     fn begin(&self, job: &[u8]) -> Result<usize, RemoteFailure>;
-    /// Has an order done, by the `slot`th of them, and waits for its receipt.
+    /// Sends an order to slot number `slot`, and waits for its receipt.
     fn perform(&self, slot: usize, order: Vec<u8>) -> Result<Vec<u8>, RemoteFailure>;
 }
 
-/// The helpers of a run, if it has any. They do not shape the mesh, so all are equal.
+/// The remote workers of a run, if it has any. The mesh does not depend on them, so all values compare equal.
 #[derive(Clone, Default)]
 pub struct Hands(pub Option<Arc<dyn Helpers>>);
 

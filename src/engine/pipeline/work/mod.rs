@@ -1,9 +1,9 @@
-//! Units of work that any process can do which sees the store's files: a cut, a sub-domain.
+//! Units of work: a cut or a sub-domain, performed by any process with access to the store's files.
 //!
-//! A [`Worker`] turns a [`WorkOrder`](tetdb_schema::work::WorkOrder) into a [`Receipt`](tetdb_schema::work::Receipt). It needs the order, the
-//! files that the order names and the size field, and never opens the catalog. The holder of the store's lock draws up orders and
-//! commits receipts, in any order. Threads of this process, files of a batch scheduler's tasks or messages between processes carry
-//! them; their bytes are the same in all three ([`tetdb_schema::work`]).
+//! A [`Worker`] turns a [`WorkOrder`](tetdb_schema::work::WorkOrder) into a [`Receipt`](tetdb_schema::work::Receipt). It needs
+//! the order, the files named in the order and the size field, and never opens the catalog. The process that holds the store's
+//! lock creates orders and commits receipts, in any order. Orders and receipts travel between threads, as files of a batch
+//! scheduler's tasks, or as messages between processes; their bytes are the same in all three ([`tetdb_schema::work`]).
 
 pub(super) mod coarse_snapshot;
 pub(super) mod common;

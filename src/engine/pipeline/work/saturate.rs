@@ -1,4 +1,4 @@
-//! The fine mesh of one sub-domain: sizes, saturation, optimization.
+//! The fine step of one sub-domain: sizes, saturation, optimization.
 
 use std::time::Instant;
 
@@ -19,11 +19,11 @@ pub struct FineReport {
     pub refine: RefineReport,
     /// Report of the optimization.
     pub optimize: OptimizeReport,
-    /// Seconds that refinement and optimization took.
+    /// Seconds of refinement and of optimization.
     pub seconds: [f64; 2],
 }
 
-/// Divides and optimizes a coarse mesh; no vertex is added in `zones`, which are final.
+/// Divides the edges of a coarse mesh and optimizes it. No vertex is added in `zones`, which are final.
 pub fn saturate_and_optimize<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &SizeField,

@@ -1,5 +1,7 @@
-//! Whether a mesh that a job began with is one: asked when the job panics, for whoever knows the format can change pages and make their
-//! sums right again.
+//! Checks that the mesh a job starts from is valid.
+//!
+//! The check runs when the job panics. A forged file can have changed pages with correct checksums, and such a mesh may make a
+//! job panic.
 
 use std::collections::{BTreeMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -11,8 +13,10 @@ use tetdb_schema::page::{RECORDS, SLOT_MASK};
 use tetdb_schema::topology::FacesAcross;
 use tetdb_store::sealed::SealedError;
 
-/// Does `work`. Errors: its own; damage, when it panics and what `open` opens, which it began with, is no mesh. Other panics are bugs and
-/// go on unwinding.
+/// Runs `work`, which starts from the mesh that `open` opens.
+///
+/// Errors: those of `work`; damage, if `work` panics and the mesh it started from is not valid. Other panics are bugs and
+/// continue to unwind.
 pub fn panic_is_damage_of<T>(
     (base, part): (&DiskPath, u32),
     open: impl Fn() -> Result<Mesh, PipelineError>,
@@ -22,7 +26,7 @@ pub fn panic_is_damage_of<T>(
         Ok(done) => return done,
         Err(panic) => panic,
     };
-    // What is raised is an error already.
+    // A raised storage error is an error already.
     if panic.is::<StorageError>() {
         resume_unwind(panic);
     }
@@ -40,7 +44,8 @@ fn damaged((base, part): (&DiskPath, u32), what: &str) -> PipelineError {
     })
 }
 
-/// Looks at the mesh of a part before work begins. Errors: damage, a face between sub-domains that nobody has beyond.
+/// Checks the interface faces of a sub-domain before work begins. Errors: damage, if an interface face has no owner on its other
+/// side.
 pub fn check_owners<P: Pages>(
     mesh: &mut Mesh<P>,
     owners: &BTreeMap<u32, FacesAcross>,
@@ -54,9 +59,10 @@ pub fn check_owners<P: Pages>(
     }
 }
 
-/// Whether every tetrahedron and face has vertices of the mesh, every neighbor the same face, and each face between sub-domains a tetrahedron
-/// behind it that keeps it.
-/// Unwinds on errors.
+/// Returns true if the mesh is valid. Unwinds on storage errors.
+///
+/// Every tetrahedron and facet must have vertices of the mesh, and every neighbor the same face. Every interface face must have a
+/// tetrahedron behind it that marks this face as required.
 fn is_sound<P: Pages>(mesh: &mut Mesh<P>) -> bool {
     let (tets, vertices) = (mesh.tet_ids_end(), mesh.vertex_ids_end());
     let is_id = |id: u32, end: u32| id < end && ((id & SLOT_MASK) as usize) < RECORDS;
@@ -64,7 +70,7 @@ fn is_sound<P: Pages>(mesh: &mut Mesh<P>) -> bool {
         face.sort_unstable();
         face
     };
-    // As it turns, from its least vertex on.
+    // Rotates a face so that its least vertex comes first; its orientation stays.
     let turned = |[a, b, c]: [u32; 3]| match a.min(b).min(c) {
         least if least == a => [a, b, c],
         least if least == b => [b, c, a],
@@ -127,7 +133,7 @@ mod tests {
         let path = DiskPath::from(std::path::Path::new("part"));
         let error = check_owners(&mut mesh, &BTreeMap::new(), (&path, 1)).expect_err("no owner");
         assert!(error.to_string().contains("none has beyond"), "{error}");
-        // Three of eight corners that are no face.
+        // Three of the eight corners that are not a face.
         let mut tets = Vec::new();
         while let Some((t, tet)) = mesh.next_tet(tets.last().map_or(0, |&(t, _)| t + 1)) {
             tets.push((t, tet));
@@ -144,7 +150,7 @@ mod tests {
             is_sound(&mut mesh)
         };
         assert!(with([b, c, a]));
-        // The other way round it lies before its tetrahedron; another face may change.
+        // Reversed, the face lies in front of its tetrahedron; another face is not required.
         assert!(!with([a, c, b]) && !with(tet.face(0)));
         assert!(!with(none.expect("three that are no face")));
     }

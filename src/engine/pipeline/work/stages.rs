@@ -1,5 +1,5 @@
-//! Meshes on their way, kept to be looked at: of each bisection the mesh before it, the mesh with its zone refined, and the faces of
-//! the interface before and after the choice.
+//! Intermediate meshes of bisections, kept for inspection: the mesh before a bisection, the mesh with its refined zone, and the
+//! interface faces before and after the choice.
 
 use tetdb_schema::ids::SubdomainId;
 
@@ -18,10 +18,10 @@ use tetdb_schema::topology::{StageFaces, Triangle};
 use tetdb_store::sealed::{Form, Sealed};
 use tetdb_store::store::{Catalog, Step, StoreError};
 
-/// Generation of the first file; no sub-domain has as many.
+/// Generation of the first file; no sub-domain reaches so many.
 const FIRST: u32 = 1 << 30;
 
-/// Where the stages of one cut go.
+/// Destination of the stages of one cut.
 pub struct StageFiles<'a> {
     pub cut: u32,
     pub output: &'a DiskPath,
@@ -42,7 +42,7 @@ fn generation(stage: Stage) -> u32 {
 }
 
 impl StageFiles<'_> {
-    /// Seals the mesh as it is. Effects: its scratch map is used up. Errors: the disk.
+    /// Seals the current mesh. Effects: its scratch map is overwritten and cleared. Errors: the disk.
     pub fn save<P: Pages>(
         &self,
         mesh: &mut Mesh<P>,
@@ -68,7 +68,7 @@ impl StageFiles<'_> {
 }
 
 impl Stages {
-    /// A row for each file.
+    /// Returns a row for each file.
     pub fn rows(&self, zone: &Zone) -> Vec<StageRow> {
         let row = |(stage, sealed): &(Stage, Sealed)| StageRow {
             cut: zone.cut,
@@ -80,7 +80,7 @@ impl Stages {
         self.sealed.iter().map(row).collect()
     }
 
-    /// The faces of the interface, for [`list`].
+    /// Returns the bytes of the interface faces, for [`list`].
     pub fn face_bytes(&self) -> Vec<u8> {
         match self.sealed.is_empty() {
             true => Vec::new(),
@@ -96,7 +96,7 @@ impl Stages {
     }
 }
 
-/// Lists the files of a cut's stages.
+/// Lists the files of a cut's stages in `step`.
 pub fn list(rows: &[StageRow], faces: &[u8], step: &mut Step) {
     for stage in rows {
         step.list_file(stage.cut, stage.row.generation);
@@ -107,7 +107,7 @@ pub fn list(rows: &[StageRow], faces: &[u8], step: &mut Step) {
     }
 }
 
-/// The faces of a cut's interface before and after the choice, where they were kept.
+/// Returns the faces of a cut's interface before and after the choice, if they were kept.
 ///
 /// Errors: a damaged catalog.
 pub fn stage_faces(catalog: &mut Catalog, cut: u32) -> Result<Option<InterfaceFaces>, StoreError> {

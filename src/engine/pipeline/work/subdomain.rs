@@ -1,4 +1,4 @@
-//! One sub-domain: saturated, optimized and sealed alone, by a worker of its own.
+//! One sub-domain: a worker saturates, optimizes and seals it alone.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -28,22 +28,22 @@ use tetdb_schema::tree::SubtreeMesh;
 use tetdb_schema::work::SubdomainReceipt;
 use tetdb_store::sealed::{Form, Sealed};
 
-/// The meshing of one sub-domain.
+/// Job that meshes one sub-domain.
 pub struct SubdomainJob {
     pub mesh: SubtreeMesh,
-    /// The file of its coarse mesh, and the file to write.
+    /// File of its coarse mesh, and the sealed file to write.
     pub base: DiskPath,
     pub sealed: DiskPath,
     pub form: Form,
-    /// Generation of the file to make.
+    /// Generation of the sealed file.
     pub generation: u32,
-    /// A size field of its own, in place of that of the whole.
+    /// Size field of the sub-domain itself, in place of that of the whole.
     pub field: Option<SizeField>,
-    /// Where to keep the coarse snapshot, if it is to be kept.
+    /// Path of the coarse snapshot, if it is kept.
     pub kept: Option<DiskPath>,
     pub scratch: DiskPath,
     pub zones: Vec<Zone>,
-    /// Owners of the other side of the faces around it, by cut.
+    /// Owners of the other side of its interface faces, by cut.
     pub owners: BTreeMap<u32, FacesAcross>,
     pub share: Plan,
 }
@@ -53,7 +53,7 @@ pub struct FinishedSubdomain {
     pub mesh: SubtreeMesh,
     pub sealed: Sealed,
     pub kept: Option<CoarseRow>,
-    /// Seconds it took to keep the coarse snapshot.
+    /// Seconds taken to write the coarse snapshot.
     pub keep_s: f64,
     pub fine: FineReport,
     pub pages: PagerStats,
@@ -63,7 +63,7 @@ pub struct FinishedSubdomain {
 }
 
 impl SubdomainJob {
-    /// Does the whole job; a failed page access ends here.
+    /// Meshes the sub-domain. A failed page access unwinds to here.
     pub fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
         let (subtree, base) = (self.mesh, self.base.clone());
         let (generation, scratch, share) = (self.generation, self.scratch.clone(), self.share);
@@ -85,7 +85,7 @@ impl SubdomainJob {
         })?
     }
 
-    /// The same for a mesh already open.
+    /// Like `run`, for a mesh that is open.
     pub fn finish(
         self,
         mut mesh: Mesh,
@@ -141,7 +141,7 @@ impl SubdomainJob {
 }
 
 impl FinishedSubdomain {
-    /// For whoever commits it; the state of the store after that is set then.
+    /// Returns the receipt for the commit. The commit sets the state of the store in the journal row.
     pub fn receipt(&self) -> SubdomainReceipt {
         let refine = &self.fine.refine;
         let measures = [

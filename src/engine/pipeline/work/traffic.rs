@@ -1,15 +1,15 @@
-//! The traffic of a pager as receipts have it.
+//! Page traffic in the form that receipts store.
 
 use tetdb_base::storage::PagerStats;
 use tetdb_schema::work::Traffic;
 
-/// The traffic of one order, and the most frames in use.
+/// Returns the traffic of one order, with its largest number of frames.
 pub fn traffic_of(pages: PagerStats, frames_used: usize) -> Traffic {
     let PagerStats { pages_read, pages_written, commits } = pages;
     Traffic { pages_read, pages_written, commits, frames_used: frames_used as u64 }
 }
 
-/// The pages of a receipt.
+/// Returns the page counts of a receipt.
 pub fn pages_of(traffic: Traffic) -> PagerStats {
     let Traffic { pages_read, pages_written, commits, .. } = traffic;
     PagerStats { pages_read, pages_written, commits }

@@ -1,4 +1,4 @@
-//! The worker: it performs orders, whoever carries them.
+//! The worker: performs orders, independent of how they reach it.
 
 use std::collections::BTreeMap;
 
@@ -14,25 +14,25 @@ use tetdb_kernel::bisect::CutReport;
 use tetdb_schema::work::{CutOrder, CutReceipt, Receipt, SubdomainOrder, WorkOrder};
 use tetdb_store::store::{Catalog, StoreError};
 
-/// Where a worker finds files and leaves new ones.
+/// Folders of a worker.
 #[derive(Clone, Debug)]
 pub struct Workplace {
     /// The folder of the store.
     pub store: DiskPath,
-    /// Where new files go, and are looked for first.
+    /// Folder of new files; input files are looked for here first.
     pub output: DiskPath,
-    /// Where pages and sorted runs go that leave memory.
+    /// Folder of pages and sort runs that leave memory.
     pub scratch: DiskPath,
 }
 
-/// Does orders.
+/// Performs orders.
 pub struct Worker<'a> {
     pub place: Workplace,
     pub common: Common<'a>,
 }
 
 impl Workplace {
-    /// In the store itself: for who has its lock.
+    /// Folders inside the store, for the process that holds its lock.
     pub fn in_store(catalog: &Catalog) -> Result<Self, StoreError> {
         let store = catalog.disk_path().clone();
         Ok(Self { output: store.clone(), store, scratch: catalog.scratch_dir()? })
@@ -46,7 +46,7 @@ impl Workplace {
         }
     }
 
-    /// A folder of this name for one order.
+    /// Creates a scratch folder for one order.
     fn scratch(&self, name: String) -> Result<DiskPath, StoreError> {
         let path = self.scratch.join(name);
         path.create_dir_all()?;
@@ -55,7 +55,7 @@ impl Workplace {
 }
 
 impl Worker<'_> {
-    /// Does one order, with the memory of `share`.
+    /// Performs one order with the memory of `share`.
     pub fn perform(
         &self,
         order: WorkOrder,
@@ -72,7 +72,7 @@ impl Worker<'_> {
         }
     }
 
-    /// Bisects a part; a failed page access ends here.
+    /// Bisects a subtree. A failed page access ends here as an error.
     pub fn cut(
         &self,
         order: &CutOrder,
@@ -98,7 +98,7 @@ impl Worker<'_> {
         job.run(watch)
     }
 
-    /// The meshing of a sub-domain, ready to run.
+    /// Returns the job that meshes a sub-domain.
     pub fn subdomain_job(
         &self,
         order: SubdomainOrder,

@@ -1,7 +1,7 @@
-//! A page about a mesh: one HTML file with everything in it, to be opened in a browser, without a network.
+//! The HTML page about a mesh: one file with all contents, for a browser without a network.
 //!
-//! The page's own text, style and program are files in `assets`; the facts about a mesh are added as data: a JSON
-//! object, and surfaces packed as text. They go to the file one after the other.
+//! The page's own text, style and program are files in `assets`. The facts about a mesh are added as data: a JSON object, and
+//! surfaces packed as text. They are written to the file one after another.
 
 mod pack;
 
@@ -14,12 +14,12 @@ use tetdb_io::write::{TextFile, WriteError};
 
 type Result<T> = std::result::Result<T, WriteError>;
 
-/// Endings of the format.
+/// File endings of the format.
 pub const ENDINGS: &str = ".html or .htm";
 
 const BODY: &str = include_str!("assets/page.html");
 const STYLE: &str = include_str!("assets/page.css");
-/// In the order in which they run.
+/// Scripts in the order in which they run.
 const PROGRAM: [&str; 5] = [
     include_str!("assets/tools.js"),
     include_str!("assets/charts.js"),
@@ -28,20 +28,20 @@ const PROGRAM: [&str; 5] = [
     include_str!("assets/controls.js"),
 ];
 
-/// A page under way; nothing has its name until [`Page::finish`].
+/// A page under construction; its file gets its name in [`Page::finish`].
 pub struct Page {
     file: TextFile,
     bounds: Aabb,
 }
 
-/// Whether a name ends as those of pages do.
+/// Returns true if the name has the ending of a page.
 pub fn is_page(out: &Path) -> bool {
     let ending = out.extension().and_then(|e| e.to_str());
     ending.is_some_and(|e| ["html", "htm"].contains(&e.to_ascii_lowercase().as_str()))
 }
 
 impl Page {
-    /// Begins the page `out`; surfaces lie within `bounds`. Errors: another ending; a folder that cannot be written.
+    /// Begins the page `out`; its surfaces lie within `bounds`. Errors: another ending; a folder that cannot be written.
     pub fn new(out: &Path, title: &str, bounds: Aabb) -> Result<Self> {
         if !is_page(out) {
             return Err(WriteError::UnknownFormat { path: out.to_owned(), known: ENDINGS });
@@ -49,7 +49,7 @@ impl Page {
         let mut file = TextFile::new(out)?;
         file.line("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">")?;
         file.line("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">")?;
-        // Nothing is fetched, whoever asks.
+        // The policy forbids all network access.
         file.line("<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\">")?;
         file.line("<link rel=\"icon\" href=\"data:,\">")?;
         file.line(&format!("<title>{} – tetdb</title>", escaped(title)))?;
@@ -65,7 +65,7 @@ impl Page {
             .line(&format!("<script type=\"text/plain\" id=\"surface-{name}\">{text}</script>"))
     }
 
-    /// Adds the data about the mesh, and the program; returns the file's length. Errors: the disk.
+    /// Adds the data about the mesh and the program; returns the length of the file. Errors: the disk.
     pub fn finish(mut self, data: &serde_json::Value) -> Result<u64> {
         self.file.line("<script type=\"application/json\" id=\"data\">")?;
         self.file.line(&inert(&data.to_string()))?;
@@ -78,7 +78,7 @@ impl Page {
     }
 }
 
-/// JSON that ends no script and begins no comment, whatever its texts say: `<` only occurs in texts.
+/// Escapes JSON so that its strings can neither end a script nor begin a comment; `<` occurs only in strings.
 fn inert(json: &str) -> String {
     json.replace('<', "\\u003c")
 }

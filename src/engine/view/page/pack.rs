@@ -1,4 +1,4 @@
-//! Triangles in few letters: differences as numbers of seven bits a byte, then base 64. `assets/tools.js` unpacks them.
+//! Compact text of triangles: differences as numbers of seven bits per byte, then base 64. `assets/tools.js` unpacks them.
 
 use tetdb_base::geom::{Aabb, Point};
 
@@ -7,13 +7,13 @@ const STEPS: f64 = 65535.0;
 
 /// A surface to be packed.
 ///
-/// Shape: `triangles[i]` = places in `points`, which are numbered by their first use; each of `channels` has a number for each triangle.
+/// Shape: `triangles[i]` = places in `points`, numbered by first use; each of `channels` has one number per triangle.
 pub struct Surface<'a> {
     /// Positions of the vertices.
     pub points: &'a [Point],
     /// Vertices of each triangle.
     pub triangles: &'a [[u32; 3]],
-    /// Numbers of the triangles, a list for each channel.
+    /// Numbers of the triangles, one list per channel.
     pub channels: &'a [Vec<u32>],
 }
 
@@ -28,13 +28,13 @@ impl Packed {
         self.0.push(n as u8);
     }
 
-    /// 0, -1, 1, -2, … become 0, 1, 2, 3, …
+    /// Writes a signed number: 0, -1, 1, -2, … become 0, 1, 2, 3, …
     fn difference(&mut self, n: i32) {
         self.number((n << 1 ^ n >> 31) as u32);
     }
 }
 
-/// The surface as text. Positions are rounded to steps of a 65535th of the longest side of `bounds`.
+/// Packs the surface as text. Positions are rounded to 1/65535 of the longest side of `bounds`.
 pub(super) fn pack(surface: &Surface, bounds: &Aabb) -> String {
     let mut out = Packed(Vec::new());
     out.number(surface.points.len() as u32);
@@ -66,7 +66,7 @@ pub(super) fn pack(surface: &Surface, bounds: &Aabb) -> String {
     base64(&out.0)
 }
 
-/// Source: RFC 4648, section 4.
+/// Encodes bytes in base 64. Source: RFC 4648, section 4.
 fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);

@@ -1,25 +1,25 @@
-//! Colors for values and for kinds.
+//! Colors for values and for categories.
 
 /// Red, green, blue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rgb(pub [u8; 3]);
 
 impl Rgb {
-    /// This with a share of another, 0 to 1.
+    /// Mixes this color with a share of another, 0 to 1.
     #[must_use]
     pub fn mixed(self, other: Self, share: f32) -> Self {
         let mix = |a: u8, b: u8| f32::from(a) + share * (f32::from(b) - f32::from(a));
         Self([0, 1, 2].map(|k| mix(self.0[k], other.0[k]).round() as u8))
     }
 
-    /// The same in less light, 0 to 1.
+    /// Darkens this color to a share of its light, 0 to 1.
     #[must_use]
     pub fn lit(self, light: f32) -> Self {
         Self(self.0.map(|c| (f32::from(c) * light) as u8))
     }
 }
 
-/// From dark blue over green to yellow, lighter all the way: told apart without colors too.
+/// Stops of the color scale from dark blue over green to yellow. Lightness rises throughout, so values differ in gray too.
 const STOPS: [[f64; 3]; 6] = [
     [52.0, 28.0, 92.0],
     [52.0, 84.0, 142.0],
@@ -29,7 +29,7 @@ const STOPS: [[f64; 3]; 6] = [
     [252.0, 236.0, 120.0],
 ];
 
-/// The color of a share of the way from least to most.
+/// Returns the color at a share of the way from the least to the greatest value.
 pub fn scale(share: f64) -> Rgb {
     let share = if share.is_nan() { 0.0 } else { share };
     let at = share.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
@@ -38,8 +38,8 @@ pub fn scale(share: f64) -> Rgb {
     Rgb([0, 1, 2].map(|k| (STOPS[i][k] + t * (STOPS[i + 1][k] - STOPS[i][k])).round() as u8))
 }
 
-/// The color of kind `n`: hues a golden section apart, so that near numbers look different however many there are. The page's
-/// script does the same.
+/// Returns the color of category `n`. Hues are a golden section apart, so that near numbers look different, however many there are. The
+/// page's script uses the same formula.
 pub fn category(n: u32) -> Rgb {
     let hue = (f64::from(n) * 0.618_033_988_749_895 + 0.58).fract() * 6.0;
     // Every other round of hues is darker.

@@ -1,6 +1,6 @@
-//! Numbers drawn without a font: three by five dots each.
+//! Digits drawn without a font, three by five dots each.
 
-/// Rows from the top, the left dot first.
+/// Dots of each character: rows from the top, the left dot in the highest bit.
 const GLYPHS: [(char, [u8; 5]); 14] = [
     ('0', [0b111, 0b101, 0b101, 0b101, 0b111]),
     ('1', [0b010, 0b110, 0b010, 0b010, 0b111]),
@@ -18,7 +18,7 @@ const GLYPHS: [(char, [u8; 5]); 14] = [
     ('e', [0b000, 0b011, 0b111, 0b100, 0b011]),
 ];
 
-/// A number in at most nine characters.
+/// Formats a number in at most nine characters.
 pub(super) fn shown(x: f64) -> String {
     match x.abs() {
         0.0 => "0".to_owned(),
@@ -30,7 +30,7 @@ pub(super) fn shown(x: f64) -> String {
     }
 }
 
-/// The dots of a text, as column and row.
+/// Returns the dots of a text, as column and row.
 pub(super) fn pixels(text: &str) -> impl Iterator<Item = [u8; 2]> + '_ {
     text.chars().zip(0u8..).flat_map(|(c, place)| {
         let glyph = GLYPHS.iter().find(|(g, _)| *g == c).map(|(_, rows)| *rows);

@@ -1,6 +1,7 @@
-//! Pictures of flat polygons with a bar of colors: PNG and SVG.
+//! Pictures of flat polygons with a color bar: PNG and SVG.
 //!
-//! Polygons are drawn as they come, so memory does not grow with their number: a PNG is its pixels, an SVG goes to its file line by line.
+//! Polygons are drawn as they arrive, so memory does not grow with their number. A PNG is held as pixels; an SVG is written line
+//! by line.
 
 mod color;
 mod digits;
@@ -17,20 +18,20 @@ use tetdb_io::write::WriteError;
 
 type Result<T> = std::result::Result<T, WriteError>;
 
-/// Endings of the formats.
+/// File endings of the formats.
 pub const ENDINGS: &str = if cfg!(feature = "pictures") { ".png or .svg" } else { ".svg" };
 
 /// Share of the picture left free on each side.
 const MARGIN: f64 = 0.04;
-/// Width of the bar of colors and what stands beside it, as a share of the height.
+/// Width of the color bar and its numbers, as a share of the height.
 const BAR: f64 = 0.16;
-/// The same of a list of kinds, and how many it has at most.
+/// Width of the list of categories as a share of the height, and its largest number of entries.
 const KINDS: f64 = 0.075;
 const KINDS_MOST: usize = 24;
-/// Edges shorter than so many pixels are not drawn: they would be all there is.
+/// Mean edge length in pixels below which edges are not drawn, since they would cover the picture.
 const EDGE_PIXELS_MIN: f64 = 4.0;
 
-/// A bar of colors from the least value up.
+/// A color bar from the least value up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColorBar {
     /// Value of the first color.
@@ -39,22 +40,22 @@ pub struct ColorBar {
     pub most: f64,
 }
 
-/// What a picture must hold.
+/// Size and contents of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureFrame {
     /// Width and height in pixels.
     pub pixels: [u32; 2],
-    /// Low and high corner of what is drawn, in its own units, up being up.
+    /// Low and high corner of the drawing, in its own units, with the second axis up.
     pub bounds: [[f64; 2]; 2],
-    /// Mean length of an edge in those units: how fine what is drawn is.
+    /// Mean length of an edge in the units of the drawing.
     pub edge: f64,
     /// The color bar beside the picture, if there is one.
     pub bar: Option<ColorBar>,
-    /// Whether colors stand for kinds, of which there are several: those named with [`Picture::kind`] are listed.
+    /// True if colors stand for categories; those passed to [`Picture::kind`] are listed.
     pub kinds: bool,
 }
 
-/// A picture under way.
+/// A picture under construction.
 pub struct Picture {
     canvas: Canvas,
     frame: PictureFrame,
@@ -63,7 +64,7 @@ pub struct Picture {
     middle: [f64; 2],
     /// Width of edges in pixels, if they are drawn.
     line: Option<f32>,
-    /// Kinds drawn so far.
+    /// Categories drawn so far.
     kinds: BTreeSet<u32>,
 }
 
@@ -74,7 +75,7 @@ enum Canvas {
 }
 
 impl Picture {
-    /// Begins the picture `out`. Errors: an ending of no format; a folder that cannot be written; a picture too large.
+    /// Begins the picture `out`. Errors: an unknown ending; a folder that cannot be written; too many pixels.
     pub fn new(out: &Path, frame: PictureFrame) -> Result<Self> {
         let ending = out.extension().and_then(|e| e.to_str()).unwrap_or_default();
         let canvas = match ending.to_ascii_lowercase().as_str() {
@@ -107,14 +108,14 @@ impl Picture {
         })
     }
 
-    /// What is drawn next is of this kind.
+    /// Adds a category to the list beside the picture.
     pub fn kind(&mut self, kind: u32) {
         if self.kinds.len() <= KINDS_MOST {
             self.kinds.insert(kind);
         }
     }
 
-    /// Draws a polygon over what is there. Errors: the disk.
+    /// Draws a polygon of up to four corners over the picture so far. Errors: the disk.
     pub fn polygon(&mut self, corners: &[[f64; 2]], color: Rgb) -> Result<()> {
         let mut pixels = [[0.0; 2]; 4];
         for (pixel, corner) in pixels.iter_mut().zip(corners) {
@@ -132,8 +133,8 @@ impl Picture {
         Ok(())
     }
 
-    /// Draws a triangle in space: what is nearer, by `heights` towards the viewer, hides what is farther. In a format without depth it is
-    /// drawn over what is there, so that far ones must come first. Errors: the disk.
+    /// Draws a triangle in space. `heights` grow towards the viewer, and nearer triangles hide farther ones. A format without
+    /// depth draws over the picture so far, so far triangles must come first. Errors: the disk.
     pub fn solid(&mut self, corners: &[[f64; 2]; 3], heights: [f64; 3], color: Rgb) -> Result<()> {
         match &mut self.canvas {
             #[cfg(feature = "pictures")]
@@ -183,7 +184,8 @@ impl Picture {
         drawn
     }
 
-    /// Draws the bar of colors and gives the file its name; returns its length. Errors: the disk.
+    /// Draws the color bar or the list of categories and gives the file its name; returns the length of the file. Errors: the
+    /// disk.
     pub fn finish(mut self) -> Result<u64> {
         if let Some(bar) = self.frame.bar {
             self.bar(bar)?;
@@ -207,7 +209,7 @@ impl Picture {
         Ok(())
     }
 
-    /// A column of colors at the right, five numbers beside it.
+    /// Draws a column of colors at the right, with five numbers beside it.
     fn bar(&mut self, bar: ColorBar) -> Result<()> {
         const STEPS: u16 = 64;
         let [width, height] = self.frame.pixels.map(|n| n as f32);
@@ -228,7 +230,7 @@ impl Picture {
         Ok(())
     }
 
-    /// Squares of the kinds that were drawn at the right, a number beside each.
+    /// Draws squares of the drawn categories at the right, with a number beside each.
     fn list(&mut self) -> Result<()> {
         let [width, height] = self.frame.pixels.map(|n| n as f32);
         let (left, side) = (width - KINDS as f32 * height, 0.022 * height);
@@ -246,7 +248,7 @@ impl Picture {
         Ok(())
     }
 
-    /// Digits in dots of `pixel` pixels.
+    /// Draws digits with dots of `pixel` pixels.
     fn text(&mut self, [x, y]: [f32; 2], pixel: f32, text: &str) -> Result<()> {
         for place in digits::pixels(text) {
             let [column, row] = place.map(f32::from);

@@ -1,4 +1,4 @@
-//! PNG, by tiny-skia.
+//! PNG pictures, by tiny-skia.
 
 use std::path::{Path, PathBuf};
 
@@ -10,18 +10,18 @@ use super::color::Rgb;
 use tetdb_io::write::WriteError;
 use tetdb_io::write::bytes;
 
-/// Color of edges, and how much of it is seen.
+/// Color and opacity of edges.
 const EDGE: ([u8; 3], f64) = ([30; 3], 0.86);
 
 pub(super) struct Png {
     out: PathBuf,
     pixels: Pixmap,
-    /// Height of what is seen in each pixel, once something in space is drawn.
+    /// Height of the visible triangle in each pixel; empty until a triangle in space is drawn.
     heights: Vec<f32>,
 }
 
 impl Png {
-    /// Errors: no memory for so many pixels.
+    /// Begins a picture. Errors: no memory for so many pixels.
     pub fn new(out: &Path, [width, height]: [u32; 2]) -> Result<Self, WriteError> {
         let mut pixels = Pixmap::new(width, height).ok_or_else(|| WriteError::TooLarge {
             path: out.to_owned(),
@@ -40,7 +40,7 @@ impl Png {
         let Rgb([r, g, b]) = color;
         let mut paint = Paint::default();
         paint.set_color_rgba8(r, g, b, 255);
-        // Smooth edges would let the background through between neighbors.
+        // With smooth edges, the background would show between neighbors.
         paint.anti_alias = false;
         let whole = Transform::identity();
         self.pixels.fill_path(&outline, &paint, FillRule::EvenOdd, whole, None);
@@ -52,7 +52,7 @@ impl Png {
         }
     }
 
-    /// A triangle that hides what is lower; edges are drawn on its own side.
+    /// Draws a triangle that hides lower ones. Its edges are drawn inside the triangle.
     pub fn solid(
         &mut self,
         corners: [[f64; 2]; 3],
@@ -75,7 +75,7 @@ impl Png {
         let length = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
         // Heights of the triangle over its three sides, in pixels.
         let over = [length(b, c), length(c, a), length(a, b)].map(|side| area.abs() / side);
-        // Pixels whose middles may lie in it.
+        // Pixels whose centers may lie in the triangle.
         let range = |axis: usize, end: usize| {
             let [x, y, z] = corners.map(|p| p[axis]);
             let (from, to) = (x.min(y).min(z) - 0.5, x.max(y).max(z) - 0.5);
@@ -88,7 +88,7 @@ impl Png {
             for x in left..right {
                 let p = [x as f64 + 0.5, y as f64 + 0.5];
                 let shares = [twice(p, b, c), twice(a, p, c), twice(a, b, p)].map(|s| s / area);
-                // A little more than the triangle, so that no pixel between neighbors is left out.
+                // A little more than the triangle is drawn, so that no pixel between neighbors is left out.
                 if shares.iter().any(|&s| s < -1e-9) {
                     continue;
                 }
@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn what_is_nearer_hides_what_is_farther_in_any_order() {
         let near = ([[2.0, 2.0], [30.0, 4.0], [6.0, 28.0]], [3.0, 3.0, 3.0], Rgb([200, 0, 0]));
-        // Comes out of the near one on the left.
+        // The far triangle rises above the near one on the left.
         let far = ([[0.0, 0.0], [31.0, 0.0], [0.0, 31.0]], [9.0, -9.0, 2.0], Rgb([0, 200, 0]));
         let draw = |order: [_; 2]| {
             let mut png = Png::new(Path::new("a.png"), [32, 32]).expect("a small picture");

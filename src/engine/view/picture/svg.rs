@@ -1,4 +1,4 @@
-//! SVG, polygon by polygon.
+//! SVG pictures, written polygon by polygon.
 
 use std::path::Path;
 
@@ -28,7 +28,7 @@ impl Svg {
     ) -> Result<(), WriteError> {
         let points: Vec<String> = corners.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
         let Rgb([r, g, b]) = color;
-        // Without edges of their own, edges of the same color close the seams.
+        // Where edges are not drawn, strokes of the fill color close the seams.
         let stroke = match line {
             Some(width) => format!("stroke=\"#222\" stroke-width=\"{width:.2}\""),
             None => format!("stroke=\"#{r:02x}{g:02x}{b:02x}\" stroke-width=\".4\""),
