@@ -1,18 +1,18 @@
-//! Lengths of edges against what was wanted, from so many edges as fit a table.
+//! Edge lengths relative to the wanted ones, from a sample of edges that fits a table.
 //!
-//! An edge belongs to several tetrahedra. Each edge has a mix of the ids of its ends; those with the lowest mixes are kept, each
-//! once, so that the sample does not depend on order and every edge has the same chance.
+//! An edge belongs to several tetrahedra. Each edge has a hash of the ids of its ends, and the edges with the lowest hashes are
+//! kept, each once. So the sample does not depend on the order, and every edge has the same chance.
 
 use tetdb_base::geom::STEP;
 use tetdb_kernel::sizing::metric_length;
 use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_store::sealed::Corner;
 
-/// Edges kept at least, when there are so many: shares of the sample are then within half a percent of those of all.
+/// Fewest edges kept, if there are so many. Shares of the sample are then within half a percent of those of all edges.
 const EDGES_LEAST: usize = 1 << 16;
 /// Bytes of the table.
 pub(super) const SAMPLE_BYTES: u64 = (4 * EDGES_LEAST * size_of::<Edge>()) as u64;
-/// Bins of metric length, and how many there are to a unit.
+/// Number of bins of metric length, and bins per unit.
 const BINS: usize = 60;
 const PER_UNIT: f64 = 20.0;
 
@@ -20,30 +20,30 @@ const PER_UNIT: f64 = 20.0;
 struct Edge {
     mix: u64,
     metric: f32,
-    /// Whether both its ends are vertices of the input.
+    /// True if both ends are vertices of the input.
     given: bool,
 }
 
-/// Edges of the mesh, each once.
+/// Statistics of edge lengths; each edge counts once.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct EdgeLengths {
-    /// Edges looked at, and about how many there are (exact when all were looked at).
+    /// Number of edges in the sample.
     pub edges: u64,
-    /// About how many edges the mesh has.
+    /// Approximate number of edges of the mesh; exact if the sample has them all.
     pub of_about: u64,
-    /// Those with both ends on the input.
+    /// Number of sample edges with both ends on the input.
     pub given: u64,
-    /// Edges with at least one new end by length / wanted length: twentieths from 0 to 3, the last with all beyond.
+    /// Edges with at least one new end by length / wanted length: twentieths from 0 to 3, the last bin with everything beyond.
     pub bins: Vec<u64>,
-    /// The same of edges with both ends on the input.
+    /// Like `bins`, for edges with both ends on the input.
     pub given_bins: Vec<u64>,
-    /// Of the edges with a new end: median, and share in [1/√2, √2].
+    /// Median of length / wanted length over the edges with a new end.
     pub median: f64,
-    /// Share of them whose length is within [1/√2, √2] of the wanted one.
+    /// Share of the edges with a new end whose length / wanted length is within [1/√2, √2].
     pub share_near: f64,
 }
 
-/// Invariant: no edge in it has a mix above `most`.
+/// A sample of edges. Invariant: no edge in it has a hash above `most`.
 pub(super) struct EdgeSample {
     edges: Vec<Edge>,
     most: u64,
@@ -54,7 +54,7 @@ impl EdgeSample {
         Self { edges: Vec::with_capacity(4 * EDGES_LEAST), most: u64::MAX }
     }
 
-    /// The six edges of a tetrahedron.
+    /// Adds the six edges of a tetrahedron.
     pub fn add(&mut self, corners: &[Corner; 4]) {
         for (i, j) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
             let (a, b) = (&corners[i], &corners[j]);
@@ -74,7 +74,7 @@ impl EdgeSample {
         }
     }
 
-    /// Leaves each edge once, and of many only some.
+    /// Leaves each edge once, and drops the edges with the highest hashes if there are too many.
     fn thin(&mut self) {
         self.once();
         while self.edges.len() > 2 * EDGES_LEAST {

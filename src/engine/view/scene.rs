@@ -1,4 +1,4 @@
-//! What of a store is shown in space: its boundary, its interfaces, and cuts across each axis.
+//! The surfaces shown in space: the boundary of a mesh, its interfaces, and cuts across each axis.
 
 use super::cluster::{Cluster, Patch, TRIANGLE_BYTES};
 use super::section::{View, pieces};
@@ -9,14 +9,14 @@ use tetdb_store::query::Selection;
 use tetdb_store::query::Solid;
 use tetdb_store::query::{QueryError, QuerySession};
 
-/// Most triangles of the boundary, of all interfaces, and of one cut. A page with all of them is below 12 MB.
+/// Largest number of triangles of the boundary, of all interfaces, and of one cut. A page with all of them is below 12 MB.
 const BOUNDARY_MOST: usize = 160_000;
 const INTERFACES_MOST: usize = 120_000;
 const CUT_MOST: usize = 24_000;
-/// Cuts across each axis.
+/// Number of cuts across each axis.
 const CUTS: u32 = 9;
 
-/// A triangle of the boundary, or between two regions.
+/// Data of a triangle of the boundary, or of one between two regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClippedSkin {
     /// Rank of the sub-domain.
@@ -27,7 +27,7 @@ pub struct ClippedSkin {
     pub label: u32,
 }
 
-/// A triangle of a cut.
+/// Data of a triangle of a cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cross {
     /// Rank of the sub-domain.
@@ -38,11 +38,11 @@ pub struct Cross {
     pub quality: f32,
     /// Mean length of the tetrahedron's longest and shortest edge.
     pub size: f32,
-    /// Which of its edges (opposite its corners) are those of a tetrahedron's polygon.
+    /// True for each edge (opposite its corner) that is an edge of the tetrahedron's polygon.
     pub edges: [bool; 3],
 }
 
-/// The mesh cut by a plane across an axis.
+/// The cut of the mesh by a plane across an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneCut {
     /// 0, 1 or 2 for x, y or z.
@@ -53,19 +53,20 @@ pub struct SceneCut {
     pub patch: Patch<Cross>,
 }
 
-/// Surfaces of a mesh, one after the other as they are wanted: each may take a large part of the memory.
+/// Access to the surfaces of a mesh, one at a time: each may take a large part of the memory.
 pub struct Scene<'a> {
     inquiry: &'a mut QuerySession,
     budget: &'a Budget,
 }
 
-/// The surfaces of the mesh, for pictures in space; one at a time takes up to 24 MB of `budget`.
+/// Opens the surfaces of the mesh for pictures in space. One at a time takes up to 24 MB of `budget`.
 pub fn scene<'a>(session: &'a mut QuerySession, budget: &'a Budget) -> Scene<'a> {
     Scene { inquiry: session, budget }
 }
 
 impl Scene<'_> {
-    /// Input triangles with a tetrahedron on at least one side, turned away from the filled region where only one side is filled.
+    /// Returns the input triangles with a tetrahedron on at least one side. Where only one side is filled, the normal points away
+    /// from it.
     ///
     /// Errors: damage; a small budget.
     pub fn boundary(&mut self) -> Result<Patch<ClippedSkin>, QueryError> {
@@ -80,7 +81,7 @@ impl Scene<'_> {
                     if facet.triangle >= fin_first {
                         continue;
                     }
-                    // Behind it first: that is the side its normal points away from.
+                    // The side behind the triangle comes first: its normal points away from that side.
                     let Some(side) = [1, 0].into_iter().find(|&s| facet.tets[s] != NO_TET) else {
                         continue;
                     };
@@ -100,7 +101,7 @@ impl Scene<'_> {
         Ok(cluster.finish())
     }
 
-    /// Interface faces, each once, with the sub-domain their normal points away from and the one it points into.
+    /// Returns each interface face once, with two sub-domains: the one its normal points away from, and the one it points into.
     ///
     /// Errors: damage; a small budget.
     pub fn interfaces(&mut self) -> Result<Patch<[u32; 2]>, QueryError> {
@@ -121,13 +122,13 @@ impl Scene<'_> {
         Ok(cluster.finish())
     }
 
-    /// Where cuts are, across each axis.
+    /// Returns the axis and coordinate of each cut.
     pub fn places(&self) -> Vec<(u32, f64)> {
         let Aabb { low, high } = self.inquiry.bounds();
         (0..3 * CUTS)
             .map(|k| {
                 let (axis, step) = (k / CUTS, k % CUTS + 1);
-                // Odd parts of an odd whole: made surfaces have their vertices at round places.
+                // The offset avoids round coordinates, where generated surfaces have their vertices.
                 let share = f64::from(step) / f64::from(CUTS + 1) + 1.0 / 512.0;
                 let [from, to] = [low[axis as usize], high[axis as usize]];
                 (axis, from + (to - from) * share)
@@ -135,7 +136,7 @@ impl Scene<'_> {
             .collect()
     }
 
-    /// The cut of one of the [`Scene::places`].
+    /// Returns the cut at one of the [`Scene::places`].
     ///
     /// Errors: damage; a small budget.
     pub fn cut(&mut self, (axis, at): (u32, f64)) -> Result<SceneCut, QueryError> {
@@ -170,7 +171,7 @@ impl Scene<'_> {
         Ok((Cluster::new(&self.inquiry.bounds(), most), lease))
     }
 
-    /// Ranks with their number of chunks of a kind.
+    /// Returns each rank with its number of chunks of a kind.
     fn chunks(&self, kind: usize) -> Vec<(u32, u32)> {
         let rows = self.inquiry.rows.iter();
         rows.map(|r| (r.rank, r.chunks[kind])).collect()

@@ -1,7 +1,7 @@
-//! A cut through the mesh by a plane, as flat pieces in the order they are to be drawn.
+//! A cut through the mesh by a plane, as flat pieces in drawing order.
 //!
-//! A *section* has the polygon in which the plane cuts each tetrahedron. A *crinkle cut* has the tetrahedra that meet the plane as
-//! they are: their faces towards the viewer, the far ones first. Positions here are for the eye: they are rounded.
+//! A *section* has the polygon in which the plane cuts each tetrahedron. A *crinkle cut* has the whole tetrahedra that meet the
+//! plane: their faces towards the viewer, the far ones first. Positions are rounded here, because they only serve drawing.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use tetdb_store::query::Selection;
 use tetdb_store::query::Solid;
 use tetdb_store::query::{QueryError, QuerySession};
 
-/// A plane seen from the side its normal points to.
+/// A plane, viewed from the side its normal points to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     origin: Point,
@@ -23,27 +23,29 @@ pub struct View {
 }
 
 impl View {
-    /// The plane through `origin`, orthogonal to `normal`, which is not zero; z is up where it can be.
+    /// Creates the view of the plane through `origin`, orthogonal to `normal`, which is not zero. The z axis is up where
+    /// possible.
     pub fn new(origin: Point, normal: Point) -> Self {
-        // Twice, since one division leaves very long and very short ones off by more than rounding.
+        // The normal is scaled twice: a single division of a very long or short one has an error above rounding.
         let normal = (normal / normal.abs().max_element()).normalize();
         let upright = if normal.z.abs() > 0.999 { Point::Y } else { Point::Z };
         let up = (upright - normal * upright.dot(normal)).normalize();
         Self { origin, right: up.cross(normal), up, normal }
     }
 
-    /// How much a face with this normal faces the viewer, -1 to 1.
+    /// Returns how directly a face with this normal faces the viewer, -1 to 1.
     pub(super) fn facing(&self, normal: Point) -> f64 {
         normal.dot(self.normal)
     }
 
-    /// Where a straight line in space that lies in the plane runs in it: a point and a direction.
+    /// Returns the point and the direction in the plane of a straight line in space that lies in the plane.
     pub fn line(&self, point: Point, direction: Point) -> [[f64; 2]; 2] {
         let to = self.flat(self.origin + direction);
         [self.flat(point), to]
     }
 
-    /// The line in which another plane meets this one, as a point and a direction in it; `None` where they are parallel.
+    /// Returns the line in which another plane meets this one, as a point and a direction in this plane; `None` for parallel
+    /// planes.
     pub fn crossing(&self, point: Point, normal: Point) -> Option<[[f64; 2]; 2]> {
         let direction = self.normal.cross(normal);
         let square = direction.length_squared();
@@ -55,7 +57,7 @@ impl View {
         Some(self.line(self.origin + across * step, direction / square.sqrt()))
     }
 
-    /// The point at a place in the plane.
+    /// Returns the point in space at a position in the plane.
     pub(super) fn raised(&self, [x, y]: [f64; 2]) -> Point {
         self.origin + self.right * x + self.up * y
     }
@@ -73,19 +75,19 @@ impl View {
 /// A flat piece of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
-    /// Its corners in the plane, in input units, to the right and up; the fourth is meant where `n` is 4.
+    /// Corners in the plane, in input units, to the right and up; the fourth counts only if `n` is 4.
     pub corners: [[f64; 2]; 4],
     /// Number of corners, 3 or 4.
     pub n: usize,
     /// Heights of the corners over the plane, towards the viewer.
     pub heights: [f64; 4],
-    /// How much it faces the viewer, 0 to 1 (1 in a section); of a shell, less than 0 seen from behind.
+    /// How directly the piece faces the viewer, 0 to 1 (1 in a section); for a shell, negative if seen from behind.
     pub facing: f32,
     /// Rank of the sub-domain.
     pub subdomain: u32,
     /// Number of the region.
     pub region: u32,
-    /// Number of the label, of an input triangle.
+    /// Number of the label, for an input triangle.
     pub label: Option<u32>,
     /// Quality q of the tetrahedron.
     pub quality: f32,
@@ -93,7 +95,7 @@ pub struct Piece {
     pub size: f32,
 }
 
-/// What all pieces together are.
+/// Number and ranges of all pieces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
     /// Number of pieces.
@@ -106,11 +108,11 @@ pub struct Extent {
     pub size: [f32; 2],
 }
 
-/// Stands for no label in a record.
+/// Record value for no label.
 const NO_LABEL: u32 = u32::MAX;
 
 sort_record! {
-    /// A piece by its depth.
+    /// A piece, sorted by depth.
     struct DeepPiece {
         depth: f64,
         corners: Payload<[f64; 8]>,
@@ -127,12 +129,13 @@ sort_record! {
 
 /// The pieces of a cut, far ones first.
 pub struct Section {
-    /// What all pieces together are.
+    /// Number and ranges of all pieces.
     pub extent: Extent,
     sorted: Sorted<DeepPiece>,
 }
 
-/// Cuts what suits `selection`, whole tetrahedra when `crinkle` says so; holds about `memory_bytes` and runs in `dir`.
+/// Cuts the tetrahedra that match `selection`; with `crinkle`, takes them whole. Holds about `memory_bytes` and writes sort runs
+/// in `dir`.
 ///
 /// Errors: damage, the disk.
 pub fn section(
@@ -154,7 +157,7 @@ pub fn section(
     all.finish()
 }
 
-/// Pieces on their way into order.
+/// Pieces being sorted by depth.
 pub(super) struct Pieces {
     sorter: Sorter<DeepPiece>,
     extent: Extent,
@@ -208,7 +211,7 @@ impl Iterator for Section {
     }
 }
 
-/// The pieces of a tetrahedron with their heights over the plane.
+/// Returns the pieces of a tetrahedron with their heights over the plane.
 pub(super) fn pieces(view: &View, crinkle: bool, tet: &Hit) -> Vec<(f64, Piece)> {
     let [least, most] = tet.edges();
     let piece = |corners: &[[f64; 2]], heights: [f64; 4], facing: f64| {
@@ -245,11 +248,11 @@ pub(super) fn pieces(view: &View, crinkle: bool, tet: &Hit) -> Vec<(f64, Piece)>
     found
 }
 
-/// Where the plane cuts a tetrahedron: three or four corners, or none.
+/// Returns the polygon in which the plane cuts a tetrahedron: three or four corners, or none.
 fn polygon(view: &View, tet: &Hit) -> Vec<[f64; 2]> {
     let heights = tet.corners.map(|c| view.height(c));
     let (above, below): (Vec<usize>, Vec<usize>) = (0..4).partition(|&i| heights[i] > 0.0);
-    // From the vertex of the lower id, so that neighbors find the same point.
+    // Interpolates from the vertex of the lower id, so that neighbors compute the same point.
     let cut = |i: usize, j: usize| {
         let (i, j) = match tet.vertices[i] < tet.vertices[j] {
             true => (i, j),

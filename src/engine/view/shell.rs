@@ -1,4 +1,4 @@
-//! Surfaces of a mesh as flat pieces seen from afar: its boundary, one sub-domain's shell, the interface of a cut.
+//! Surfaces of a mesh as flat pieces for a distant viewer: its boundary, the shell of one sub-domain, the interface of a cut.
 
 use std::path::Path;
 
@@ -9,24 +9,24 @@ use tetdb_base::storage::check_cancelled;
 use tetdb_schema::record::{FACES, NO_TET};
 use tetdb_store::query::{QueryError, QuerySession, Selection, Solid};
 
-/// Which faces.
+/// The faces to show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShellView {
     /// Input triangles with a tetrahedron.
     Boundary,
-    /// All that bounds a sub-domain: input triangles and interfaces.
+    /// All faces around a sub-domain: input triangles and interfaces.
     Subdomain(u32),
-    /// The interface of a cut by the sides of its tetrahedra's middles, where stages were kept.
+    /// The natural interface of a cut, if stages were kept: each tetrahedron is on the side of its center.
     Natural(u32),
-    /// The same as it was chosen.
+    /// The chosen interface of a cut, if stages were kept.
     Chosen(u32),
 }
 
-/// A half space: what lies beyond the point in the direction is left out; tetrahedra that the plane cuts are shown whole.
+/// A half space that is left out, as a point and the direction into it. Tetrahedra that its plane cuts are shown whole.
 pub type Clip = [Point; 2];
 
-/// The faces that the viewer sees from either side, far ones first; holds about `memory_bytes` and runs in `dir`. Of faces seen from
-/// behind `facing` is negative.
+/// Returns the faces that the viewer sees from either side, far ones first. Holds about `memory_bytes` and writes sort runs in
+/// `dir`. For faces seen from behind, `facing` is negative.
 ///
 /// Errors: no such sub-domain or stage; damage; the disk.
 pub fn shell(
@@ -69,7 +69,7 @@ pub fn shell(
     all.pieces.finish()
 }
 
-/// The normal of a cut's plane, where stages were kept.
+/// Returns the normal of a cut's plane, if stages were kept.
 ///
 /// Errors: [`QueryError::NoStage`]; a damaged catalog.
 pub fn normal_of(session: &mut QuerySession, cut: u32) -> Result<Point, QueryError> {
@@ -93,7 +93,7 @@ fn triangles(session: &mut QuerySession, rank: u32, all: &mut Shown) -> Result<(
             if facet.triangle >= fin_first {
                 continue;
             }
-            // Behind it first: that is the side its normal points away from.
+            // The side behind the triangle comes first: its normal points away from that side.
             let Some(side) = [1, 0].into_iter().find(|&s| facet.tets[s] != NO_TET) else {
                 continue;
             };
@@ -107,7 +107,7 @@ fn triangles(session: &mut QuerySession, rank: u32, all: &mut Shown) -> Result<(
     Ok(())
 }
 
-/// The tetrahedra that the plane of a clip cuts, whole.
+/// Adds the tetrahedra that the plane of a clip cuts, whole.
 fn cut_tets(
     session: &mut QuerySession,
     rank: Option<u32>,
@@ -126,7 +126,7 @@ fn cut_tets(
         for face in FACES {
             let corners = face.map(|i| tet.corners[i]);
             let [a, b, c] = corners;
-            // A tetrahedron's faces that look away are behind its others.
+            // Faces that point away from the viewer lie behind the others of their tetrahedron.
             if all.view.facing((b - a).cross(c - a)) > 0.0 {
                 all.show(corners, tet.id.subdomain().rank(), tet.region, None)?;
             }
@@ -142,14 +142,14 @@ fn walls(session: &mut QuerySession, rank: u32, all: &mut Shown) -> Result<(), Q
         let part = &mut session.part(rank)?.subdomain;
         for face in part.interface_chunk(chunk)?.records {
             let corners = part.corners(face.vertices)?.map(|c| c.point);
-            // In the color of the sub-domain behind them.
+            // Walls have the color of the sub-domain on their other side.
             all.push(corners, face.other, 0, None)?;
         }
     }
     Ok(())
 }
 
-/// Faces as they are seen.
+/// Faces collected for the viewer.
 struct Shown<'a> {
     view: &'a View,
     clip: Option<Clip>,
@@ -157,7 +157,7 @@ struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    /// Shows a face, unless its middle is cut away.
+    /// Adds a face, unless its centroid is clipped.
     fn push(
         &mut self,
         corners: [Point; 3],

@@ -1,4 +1,4 @@
-//! What all tetrahedra together are like: one pass over a store.
+//! Statistics of all tetrahedra, from one pass over a store.
 
 use rayon::prelude::*;
 use tetdb_schema::record::FACES;
@@ -11,17 +11,17 @@ use tetdb_store::query::checked_chunk;
 use tetdb_store::query::{QueryError, QuerySession};
 use tetdb_store::sealed::{Corner, Shape};
 
-/// Bins of quality: fiftieths from 1 to 3, the last with all beyond.
+/// Number of bins of quality: fiftieths from 1 to 3, the last with everything beyond.
 const QUALITY_BINS: usize = 101;
 const QUALITY_PER_UNIT: f64 = 50.0;
-/// Bins of dihedral angles, two degrees each.
+/// Number of bins of dihedral angles, two degrees each.
 const ANGLE_BINS: usize = 90;
-/// Tetrahedra that one thread counts at a time.
+/// Number of tetrahedra that one thread counts at a time.
 const RUN: usize = 1024;
-/// Tetrahedra with their corners that are at hand at once: those of a chunk.
+/// Bytes of the tetrahedra of a chunk with their corners, which are in memory at once.
 const CHUNK_BYTES: u64 = 32_768 * size_of::<[Corner; 4]>() as u64;
 
-/// Counts in bins of equal width from `least` on; the last bin has all beyond.
+/// Counts in bins of equal width from `least` on; the last bin has everything beyond.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Histogram {
     /// Lower end of the first bin.
@@ -32,7 +32,7 @@ pub struct Histogram {
     pub bins: Vec<u64>,
 }
 
-/// The result of a pass.
+/// Statistics of all tetrahedra of a store.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Statistics {
     /// Number of tetrahedra.
@@ -45,22 +45,22 @@ pub struct Statistics {
     pub angles: Histogram,
     /// Least and greatest mean of a tetrahedron's longest and shortest edge.
     pub size: [f64; 2],
-    /// Quality over the least that the input triangles of a tetrahedron allow.
+    /// Excess: quality over the best quality that the input triangles of a tetrahedron allow.
     pub excess: Excess,
-    /// Edges by length, against the wanted one.
+    /// Edges by length relative to the wanted one.
     pub edges: EdgeLengths,
 }
 
-/// What is worse than the surface forces.
+/// Extremes of the excess: quality worse than the surface forces.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Excess {
-    /// The greatest.
+    /// Greatest excess.
     pub worst: f64,
-    /// Tetrahedra above 2.
+    /// Number of tetrahedra with an excess above 2.
     pub above_two: u64,
 }
 
-/// Counts of some tetrahedra; whole numbers and extremes, so that any order gives the same.
+/// Counts of some tetrahedra. They are whole numbers and extremes, so that any order gives the same result.
 #[derive(Clone)]
 struct BinCounts {
     quality: Vec<u64>,
@@ -71,7 +71,7 @@ struct BinCounts {
     excess: Excess,
 }
 
-/// Excess above this is counted.
+/// Excess above which a tetrahedron is counted.
 const EXCESS_FROM: f64 = 2.0;
 
 impl BinCounts {
@@ -85,14 +85,14 @@ impl BinCounts {
         }
     }
 
-    /// `on_surface` says which faces are input triangles.
+    /// Adds a tetrahedron; `on_surface` returns which of its faces are input triangles.
     fn add(mut self, corners: &[Corner; 4], on_surface: impl FnOnce() -> [bool; 4]) -> Self {
         let points = corners.map(|c| c.point);
         let quality = Shape::new(points).quality;
         let bin = ((quality - 1.0) * QUALITY_PER_UNIT) as usize;
         self.quality[bin.min(QUALITY_BINS - 1)] += 1;
         self.sum += (quality.min(1e6) * 2f64.powi(32)) as u128;
-        // No excess is above the quality: most tetrahedra change neither number.
+        // The excess never exceeds the quality, so most tetrahedra change neither number.
         if quality > self.excess.worst.min(EXCESS_FROM) {
             let excess = excess(points, on_surface());
             self.excess.worst = self.excess.worst.max(excess);
@@ -131,7 +131,8 @@ impl BinCounts {
     }
 }
 
-/// Measures every tetrahedron, with some ten MiB of `budget` and 32 bytes for each input triangle of a sub-domain; tells how many are done.
+/// Measures every tetrahedron; `report` receives the number done and the total. Takes some ten MiB of `budget`, and 32 bytes for
+/// each input triangle of a sub-domain.
 ///
 /// Errors: damage; a budget too small.
 pub fn statistics(
