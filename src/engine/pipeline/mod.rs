@@ -7,7 +7,7 @@
 //! | `mesh::coarse` | coarse | validate; Delaunay mesh of the surface's vertices; recover every triangle; color and empty regions |
 //! | `mesh::divide` | bisected | one cut fewer than sub-domains; each refines a zone, chooses the interface and writes two children |
 //! | `work::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
-//! | `work`, `tasks` | | a cut or a sub-domain as an order and a receipt that any process can read and write; batches of orders for schedulers |
+//! | `work`, `tasks` | | a cut or a sub-domain as an order, which any process can perform, and a receipt; batches for schedulers |
 //! | `remesh` | sealed | remesh sub-domains of a finished store from coarse snapshots, with other sizes or to repair damage; undo |
 //!
 //! The insertion of the surface's vertices may begin before the store exists (`mesh::head_start`). The pipeline receives a

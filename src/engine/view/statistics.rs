@@ -65,7 +65,7 @@ pub struct Excess {
 struct BinCounts {
     quality: Vec<u64>,
     angles: Vec<u64>,
-    /// Sum of q in units of 2⁻³², which no order of adding changes.
+    /// Sum of q in units of 2⁻³²; a sum of integers does not depend on the order of adding.
     sum: u128,
     size: [f64; 2],
     excess: Excess,

@@ -39,7 +39,7 @@ pub fn subdomain_order(
     Ok(SubdomainOrder { mesh, zones, owners })
 }
 
-/// Commits bisections in one step; each comes after those above it. Of the files written, only those of the last children stay
+/// Commits bisections in one step; `cuts` has each cut after those above it. Of the files written, only those of the last children stay
 /// listed.
 pub fn commit_cuts(catalog: &mut Catalog, cuts: &[CutReceipt]) -> Result<(), PipelineError> {
     let mut topology = TopologyChange::none(catalog)?;
@@ -102,7 +102,7 @@ pub fn close(catalog: &mut Catalog, n: u32) -> Result<(), PipelineError> {
         step.set_state(StoreState::Sealed);
         Ok(())
     })?;
-    // The scratch folder has no data of the store. A folder that cannot be removed now goes when the store is next opened for
+    // The scratch folder has no data of the store. A folder that cannot be removed now is removed when the store is next opened for
     // writing.
     let _ = scratch.remove_dir_all();
     let work = catalog.work_dir();

@@ -1,9 +1,11 @@
 //! Estimate of a mesh before any of it exists: tetrahedra, bytes and seconds.
 //!
 //! Predicted counts of tetrahedra come from the size field and the surface. Bytes and seconds per tetrahedron, vertex and
-//! triangle are measured. Unless another case is named, the measured cases are `balls,count=100` (394,000 tetrahedra on 62,000
-//! triangles), `box,h=0.02` (1.03 million on 30,000), the armadillo (1.02 million on 52,000) and `balls,count=1000` (4.04 million
-//! on 506,000).
+//! triangle are measured. Unless another case is named, the measured cases are:
+//! - `balls,count=100`: 394,000 tetrahedra on 62,000 triangles;
+//! - `box,h=0.02`: 1.03 million tetrahedra on 30,000 triangles;
+//! - the armadillo: 1.02 million tetrahedra on 52,000 triangles;
+//! - `balls,count=1000`: 4.04 million tetrahedra on 506,000 triangles.
 
 use super::regions::{refuse_outer_points, refuse_outer_sheets, region_sizes};
 use super::{MEMORY_MIN, Options, Plan};
@@ -37,7 +39,7 @@ const TETS_PER_SUBDOMAIN: f64 = (5u64 << 20) as f64;
 /// Like `TETS_PER_SUBDOMAIN`, for a mesh so large that it has [`MANY`] sub-domains in any case. 41 million tetrahedra take less
 /// time in four sub-domains than in ten, within 1 GiB too.
 const TETS_PER_SUBDOMAIN_MAX: f64 = 2.0 * TETS_PER_SUBDOMAIN;
-/// Most tetrahedra of a mesh in one sub-domain. Two threads are faster on two sub-domains than within one.
+/// Most tetrahedra of a mesh that stays in one sub-domain by default. Two threads are faster on two sub-domains than within one.
 const TETS_ALONE: f64 = (2u64 << 20) as f64;
 /// Number of sub-domains from which on threads and machines have enough of them to share.
 const MANY: f64 = 32.0;
@@ -365,7 +367,7 @@ impl Estimate {
         let triangles = BESIDE_TRIANGLE * self.triangles as f64;
         let share = self.at_once(threads) / f64::from(self.subdomains);
         let beside = BESIDE_TET / FRAMES_TET * pages + share * triangles;
-        // A subtree that is opened again is read through a cache.
+        // A reopened subtree is read through a cache.
         let cache = match self.subdomains {
             1 => 0.0,
             _ => ZONE_TET * self.zone_tets().min(1e6),

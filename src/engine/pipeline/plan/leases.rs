@@ -47,7 +47,7 @@ impl Leases {
         Ok((plan, budget.lease(bytes, "the working mesh")?))
     }
 
-    /// Drops the surface's lease and plans again with its bytes, except those that stay behind in the heap.
+    /// Drops the surface's lease and replans the memory with its bytes, except those that stay behind in the heap.
     pub fn without_surface(
         self,
         options: &Options,

@@ -134,7 +134,7 @@ impl Picture {
     }
 
     /// Draws a triangle in space. `heights` grow towards the viewer, and nearer triangles hide farther ones. A format without
-    /// depth draws over the picture so far, so far triangles must come first. Errors: the disk.
+    /// depth draws each triangle over the earlier ones, so the far ones must come first. Errors: the disk.
     pub fn solid(&mut self, corners: &[[f64; 2]; 3], heights: [f64; 3], color: Rgb) -> Result<()> {
         match &mut self.canvas {
             #[cfg(feature = "pictures")]
