@@ -384,7 +384,7 @@ impl Estimate {
         cap
     }
 
-    /// Wall seconds on `threads` threads, with verification. Only the meshing of sub-domains uses several threads.
+    /// Wall seconds on `threads` threads, with verification. The estimate divides only the meshing of sub-domains among threads.
     pub fn seconds(&self, threads: usize) -> f64 {
         let side_by_side = f64::from(self.subdomains).min(threads.max(1) as f64);
         SECONDS_TRIANGLE * self.triangles as f64

@@ -16,7 +16,7 @@ use tetdb_base::storage::{Budget, attempt};
 use tetdb_schema::blob::Blob;
 use tetdb_store::store::{Catalog, StoreError};
 
-/// Predicted size of a sub-domain after remeshing.
+/// Number of tetrahedra of a sub-domain, now and predicted for after its remeshing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
     /// Rank of the sub-domain.
@@ -46,7 +46,7 @@ pub fn resaturate(
     })?
 }
 
-/// Predicts the sizes that [`resaturate`] would give, without remeshing. Errors: as there.
+/// Predicts the number of tetrahedra that [`resaturate`] would give each sub-domain, without remeshing. Errors: as there.
 pub fn forecast(
     catalog: &mut Catalog,
     options: &Options,

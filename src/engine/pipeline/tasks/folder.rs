@@ -34,7 +34,7 @@ impl Patience {
         })
     }
 
-    /// Calls `look` until it finds something or the deadline passes.
+    /// Calls `look` until it returns a value or the deadline passes.
     pub fn until<T>(
         self,
         mut look: impl FnMut() -> Result<Option<T>, StorageError>,

@@ -50,7 +50,7 @@ impl Gathered {
 /// Plans the remaining work of an unfinished store with a coarse mesh, for about `tasks` tasks at once. Repeating a plan changes
 /// nothing.
 ///
-/// `options` are the job's options as JSON. Errors: no coarse mesh; nothing left to do; a task of another plan at work; the disk.
+/// `options` are the job's options as JSON. Errors: no coarse mesh; nothing left to do; a running task of another plan; the disk.
 pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), PipelineError> {
     attempt(|| {
         let folder = TaskFolder::of(catalog.work_dir());

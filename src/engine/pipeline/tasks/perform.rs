@@ -31,7 +31,7 @@ const RENEWED_EVERY: Duration = Duration::from_secs(5);
 /// Settings of a task; the mesh does not depend on them.
 #[derive(Clone, Debug)]
 pub struct TaskSettings {
-    /// Local folder for files being written; `None` for the store's folder of tasks.
+    /// Local folder for files being written; `None` for folders of the store.
     pub scratch: Option<PathBuf>,
     /// How long a file may be late.
     pub wait: Duration,
