@@ -82,7 +82,7 @@ impl Sizes {
         self.with_shape(SourceShape::Cylinder { ends, radius }, h, outside)
     }
 
-    /// Wants at most `h` in a region, given by its number or by a label on it.
+    /// Wants at most `h` in a region, given by its number, its name or a label on it.
     pub fn in_region(mut self, region_or_label: &str, h: Length) -> Self {
         self.sizes.regions.push(RegionSize { which: region_or_label.trim().to_owned(), h });
         self
