@@ -11,6 +11,7 @@ const MAPPED_FROM: i32 = 256 << 10;
 
 /// Heaps for all threads. With one heap, threads wait for each other: a run that mostly mends bad tetrahedra took two threads as long as
 /// one. With four, two threads have at most 1 MiB more resident.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
 const HEAPS: i32 = 4;
 
 /// Configures the allocator. Must be called before any thread starts.
