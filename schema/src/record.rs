@@ -115,7 +115,7 @@ pub struct SealedTet {
 }
 
 impl SealedTet {
-    /// The same tetrahedron turned so that its smallest vertex leads and the next smallest of the even turns follows.
+    /// The tetrahedron with its nodes evenly permuted: the smallest vertex is first, and the second is the smallest of the other three.
     #[must_use]
     pub fn rotated(self) -> Self {
         // For each leading vertex, an even permutation that brings it to the front.

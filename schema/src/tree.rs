@@ -103,13 +103,13 @@ impl Default for IdCounts {
 /// Counts that, with the pages, are the whole state of a working mesh.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeshState {
-    /// Of tetrahedra.
+    /// Counts of tetrahedra.
     pub tets: IdCounts,
-    /// Of vertices.
+    /// Counts of vertices.
     pub vertices: IdCounts,
-    /// Of facets.
+    /// Counts of facets.
     pub facets: IdCounts,
-    /// Of interface faces.
+    /// Counts of interface faces.
     pub interface_faces: IdCounts,
 }
 
@@ -146,7 +146,7 @@ impl MeshState {
         self.tets.n_live
     }
 
-    /// The counts as numbers, for storing beside the pages.
+    /// The counts as numbers, for storing in addition to the pages.
     pub fn to_words(self) -> [u32; MESH_STATE_WORDS] {
         let counts = self.counts().map(|c| [c.fresh, c.free_head, c.n_live]);
         counts.as_flattened().try_into().expect("four times three")
@@ -186,7 +186,7 @@ pub struct SubtreeMesh {
     pub generation: u32,
     /// Counts of the records.
     pub state: MeshState,
-    /// Of each of [`WORKING_KINDS`]: the first page and the number of pages.
+    /// The first page and the number of pages, for each of [`WORKING_KINDS`].
     pub extents: [[u32; 2]; WORKING_KINDS.len()],
     /// Predicted load of the subtree.
     pub load: f64,

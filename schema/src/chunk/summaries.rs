@@ -1,4 +1,4 @@
-//! Summaries of chunks: boxes, ranges and counts that tell a reader which chunks to skip.
+//! Summaries of chunks: boxes, ranges and counts, by which a reader skips chunks.
 
 use super::columns::{ColumnReader, ColumnWriter, Malformed};
 use super::{ChunkKind, ChunkRecord};

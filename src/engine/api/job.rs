@@ -40,7 +40,7 @@ pub fn options_of(job: &Job, store: &Path) -> Result<MeshOptions, Error> {
 #[doc(hidden)]
 pub fn is_same(job: &Job, options: &MeshOptions, surfaces: &[Source]) -> bool {
     let same = serde_json::from_str::<MeshOptions>(&job.options).is_ok_and(|mut o| {
-        // Whether snapshots are kept, and the storage form, do not affect the mesh.
+        // Kept snapshots and the storage form do not affect the mesh.
         o.drop_coarse = options.drop_coarse;
         o.seal = options.seal;
         o == *options

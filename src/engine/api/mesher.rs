@@ -131,7 +131,7 @@ impl Mesher {
     /// Names the region around `point`, and fills it under [`Regions::Seeds`]. May be repeated.
     ///
     /// The name is valid wherever a region is expected: in sizes, questions and exports. A seed is refused when meshing starts
-    /// (`bad-seed`) if it lies outside, on a triangle or in a region that stays empty, or if a region gets two names.
+    /// (`bad-seed`) if it lies outside, on a triangle or in a region that stays empty. Two names for one region are refused too.
     pub fn region_seed(mut self, point: [f64; 3], name: Option<&str>) -> Self {
         let kind = SeedKind::Region(name.map(str::to_owned));
         let point = Point::from_array(point);
@@ -343,7 +343,7 @@ impl Mesher {
         Ok(Created { path: path.to_owned(), was_there: false, traffic: Some((&summary).into()) })
     }
 
-    /// Refuses a path that holds something other than a finished store, before a surface is read for it.
+    /// Refuses a path with an unfinished store, or with files that are no store, before a surface is read for it.
     #[doc(hidden)]
     pub fn check_path(path: &Path, existing: Existing) -> Result<(), Error> {
         if !path.exists() || existing == Existing::Replace {

@@ -158,7 +158,7 @@ impl Ranks {
         Ok(end)
     }
 
-    /// Ends this rank after all other ranks. Rank 0 tells the others to end.
+    /// Ends this rank after all other ranks. Rank 0 lets the others end.
     pub fn end(&self) {
         if self.is_first() {
             self.mailbox.others().for_each(|rank| self.mailbox.send(rank, CONTROL, vec![END]));
