@@ -183,9 +183,10 @@ pub fn delaunay(surface: &Surface) -> Mesh<FlatPages> {
     mesh
 }
 
-/// The first defect of a mesh, if any: a volume that is not positive, neighbors that are not mutual, required faces other than the
-/// surface's triangles, open faces that are not required, vertices added on the surface. Without a surface, only the first two are
-/// checked.
+/// The first defect of a mesh, if any.
+///
+/// Checks that volumes are positive and neighbors mutual. With a surface, also checks that required faces are its triangles, that open
+/// faces are required, and that no vertices were added on the surface.
 fn wrong(mesh: &mut Mesh<FlatPages>, surface: Option<&Surface>) -> Option<String> {
     let sorted = |mut f: [u32; 3]| {
         f.sort_unstable();

@@ -100,7 +100,7 @@ fn wall_of(s: &mut Shape, polygon: &[u32], axes: [usize; 2]) {
     }
 }
 
-/// The surface of a box of `n[0] * n[1] * n[2]` cells; `diagonal(x, y, face)` says how a square is cut.
+/// The surface of a box of `n[0] * n[1] * n[2]` cells; `diagonal(x, y, face)` selects the diagonal that cuts a square.
 ///
 /// The points of a grid are cospherical by dozens, so most diagonals are chosen by ties, and most of these choices are wrong.
 pub fn grid(n: [u32; 3], mut diagonal: impl FnMut(u32, u32, usize) -> bool) -> Shape {
