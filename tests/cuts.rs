@@ -1,8 +1,8 @@
-//! Cuts by planes that nobody would choose, and by the plane of the paper.
+//! Cuts by unusual planes, and by the plane of the paper.
 //!
-//! Why: a plane may be given by hand, and the one that is chosen may come to lie anywhere; whatever it is, no face of the input may be lost.
-//! How: samples meshed in two sub-domains with a plane given, verified against the surface; the paper's plane compared with
-//! eigenvectors found in another way.
+//! Why: a plane may be given by hand, and a chosen plane may lie anywhere. With any plane, no face of the input may be lost.
+//! How: samples are meshed in two sub-domains with a given plane, and verified against the surface. The paper's plane is compared with
+//! eigenvectors computed in another way.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ fn sample(words: &str) -> Surface {
     made.expect("a sample").into()
 }
 
-/// Meshes `surface` in two sub-domains cut by `plane`, and looks at the store.
+/// Meshes `surface` in two sub-domains cut by `plane`, and inspects the store.
 fn mesh_cut_by<T>(
     surface: &Surface,
     plane: Plane,
@@ -66,7 +66,7 @@ fn across_x(offset: f64) -> Plane {
     Plane { normal, offset }
 }
 
-/// A cube with a hole in its middle: `shape`, about 1 long around the origin, made `size` as large.
+/// A cube with a hole in its middle: `shape`, about 1 long around the origin, scaled to `size`.
 fn cube_with_hole(shape: &Surface, h: f64, size: Point) -> Surface {
     let mut surface = sample(&format!("box,h={h}"));
     let first = surface.points.len() as u32;
@@ -114,7 +114,7 @@ fn a_plane_that_leaves_nothing_on_one_side_is_refused() {
 
 #[test]
 fn a_plane_through_a_needle_thin_gap_loses_nothing() {
-    // An octahedron pressed flat: nowhere thicker than a five-thousandth of an edge, and no short edge that would ask for small sizes.
+    // A flattened octahedron: nowhere thicker than a five-thousandth of an edge, and without short edges that would require small sizes.
     let corners = [(0, 1e-4), (1, 0.3), (2, 0.3)].into_iter();
     let triangles =
         [[0, 2, 4], [1, 4, 2], [0, 4, 3], [1, 3, 4], [0, 5, 2], [1, 2, 5], [0, 3, 5], [1, 5, 3]];
@@ -129,13 +129,13 @@ fn a_plane_through_a_needle_thin_gap_loses_nothing() {
     is_whole(&surface, across_x(0.5 + 0.5e-4));
 }
 
-/// Turns around two axes.
+/// Rotates a point around two axes.
 fn turned(p: Point, a: f64, b: f64) -> Point {
     let (x, y) = (a.cos() * p.x - a.sin() * p.y, a.sin() * p.x + a.cos() * p.y);
     Point::new(b.cos() * x - b.sin() * p.z, y, b.sin() * x + b.cos() * p.z)
 }
 
-/// Direction of the largest spread of the centroids, by powers of the matrix of their moments.
+/// Direction of the largest spread of the centroids, by powers of their moment matrix.
 fn spread(mesh: &mut Mesh<FlatPages>) -> Point {
     let mut middles = Vec::new();
     let mut from = 0;
@@ -173,13 +173,13 @@ fn papers_plane(surface: &Surface) -> (Mesh<FlatPages>, Plane) {
 
 #[test]
 fn the_papers_plane_is_across_the_axis_of_inertia_and_turns_with_the_mesh() {
-    // Round ones, where nothing has to be recovered: what recovery does depends on the order of coordinates.
+    // Round shapes, where nothing needs recovery: recovery depends on the order of coordinates.
     let base = ["0.5", "0.6", "0.7"].map(|h| sample(&format!("sphere,h={h}")));
     for k in 0..50u32 {
         let f = f64::from(k);
         let mut surface = base[k as usize % 3].clone();
         let stretch = Point::new(1.0, 1.5 + 0.03 * f, 2.5 + 0.05 * f);
-        // No five points on a sphere, no four in a plane: rounding must not decide what the mesh is.
+        // No five points on a sphere and no four in a plane, so that rounding cannot change the mesh.
         for (i, p) in (0u64..).zip(&mut surface.points) {
             let noise =
                 |axis| (mix(3 * i + axis + 1000 * u64::from(k)) >> 11) as f64 / (1u64 << 53) as f64;

@@ -32,7 +32,7 @@ const HOUSE: &[(&str, &[&[&str]])] = &[
     ("cli", &[]),
 ];
 
-/// Longer files and functions are looked at a second time: those left are below, each with its reason.
+/// Files and functions above these lengths need a reason. The exceptions are listed below, each with its reason.
 const FILE_LINES_MAX: usize = 500;
 const FUNCTION_LINES_MAX: usize = 80;
 
@@ -118,7 +118,7 @@ fn circles_are_found_through_reexports_and_beside_functions_of_the_same_name() {
         ("a::c", "use crate::a::renamed;"),
         ("a::d", "use super::Hidden; use super::super::e::E;"),
         ("e", "pub struct E;"),
-        // A function and a module of one name: the path through it is the module's.
+        // A function and a module with the same name: the path through that name is the module's.
         ("f", "mod g; mod h; mod i; pub use i::g;"),
         ("f::g", "use super::h::H;"),
         ("f::h", "use super::g::G; sort_record! { struct R { x: super::i::I } }"),
@@ -171,7 +171,7 @@ fn long_files_and_functions_are_those_with_a_reason() {
     assert_eq!(functions, listed(LONG_FUNCTIONS));
 }
 
-/// Lines of functions and of tests in a file.
+/// Numbers of lines of the functions and of the tests in a file.
 #[derive(Default)]
 struct Measured {
     functions: Vec<(String, usize)>,
@@ -204,7 +204,7 @@ impl<'ast> Visit<'ast> for Measured {
     }
 }
 
-/// Whether an item is built for tests alone.
+/// Returns whether an item is built only for tests.
 fn is_test(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|a| match &a.meta {
         syn::Meta::List(list) if a.path().is_ident("cfg") => list.tokens.to_string() == "test",
@@ -212,10 +212,10 @@ fn is_test(attributes: &[syn::Attribute]) -> bool {
     })
 }
 
-/// A file as a module: what it imports, and the other paths in it.
+/// A file as a module: its imports, and the other paths in it.
 #[derive(Default)]
 struct Module {
-    /// Name here and path, of every `use`.
+    /// Local name and path of every `use`.
     uses: BTreeMap<String, Vec<String>>,
     paths: Vec<Vec<String>>,
 }
@@ -310,7 +310,7 @@ impl<'ast> Visit<'ast> for Module {
     }
 
     fn visit_item_macro(&mut self, item: &'ast syn::ItemMacro) {
-        // What a macro defines is resolved where it is used.
+        // Paths in a macro definition are resolved where the macro is used.
         if !item.mac.path.is_ident("macro_rules") {
             self.visit_macro(&item.mac);
         }
@@ -337,11 +337,11 @@ impl Crate {
         Self { files: files.collect() }
     }
 
-    /// File -> files of the same module that it takes something from.
+    /// For each file, the files of the same module from which it imports.
     fn graph(&self) -> BTreeMap<String, BTreeSet<String>> {
         let mut graph = BTreeMap::new();
         for (name, module) in &self.files {
-            // A name of its own children that a file only passes on counts where it is used.
+            // A re-exported name of a file's own children counts where the name is used.
             let used = module.uses.iter().filter(|(alias, path)| {
                 !self.is_child(name, &path[0]) || module.paths.iter().any(|p| p[0] == **alias)
             });
@@ -359,7 +359,7 @@ impl Crate {
         self.files.contains_key(&join(module, name))
     }
 
-    /// The file that defines the end of a path; none for a folder's own name and for other crates.
+    /// The file that defines the end of a path; `None` for a folder's own name and for other crates.
     fn file_of(&self, from: &str, path: &[String], depth: u32) -> Option<String> {
         let (mut at, mut rest) = match path[0].as_str() {
             "crate" => (String::new(), &path[1..]),
@@ -415,7 +415,7 @@ fn module_of(path: &Path) -> String {
     }
 }
 
-/// The largest groups of files that all lead to each other.
+/// The largest groups of files that import each other, directly or through others.
 fn circles(graph: &BTreeMap<String, BTreeSet<String>>) -> Vec<BTreeSet<String>> {
     let reach: BTreeMap<&String, BTreeSet<&String>> =
         graph.keys().map(|f| (f, reached(f, graph))).collect();

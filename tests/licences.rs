@@ -1,11 +1,11 @@
-//! Everything this program is built from may be used freely.
+//! All dependencies of this program have permissive licences.
 //!
-//! Why: MIT OR Apache-2.0 is a promise about the whole, and one dependency can break it.
-//! How: `cargo metadata` lists what is built on this platform; each licence expression must offer a permissive choice.
+//! Why: MIT OR Apache-2.0 is a promise about the whole program, and one dependency can break it.
+//! How: `cargo metadata` lists the packages built on this platform; each licence expression must offer a permissive choice.
 
 use std::process::Command;
 
-/// Licences that ask for no more than a notice.
+/// Licences that require no more than a notice.
 const PERMISSIVE: &[&str] = &[
     "MIT",
     "MIT-0",
@@ -81,7 +81,7 @@ fn packages() -> Vec<serde_json::Value> {
     metadata["packages"].as_array().expect("metadata lists packages").clone()
 }
 
-/// Whether some choice of the expression is permissive: OR needs one side, AND needs both.
+/// Returns whether some choice of the expression is permissive: OR needs one side, AND needs both.
 fn is_permissive(expression: &str) -> bool {
     let text = expression.replace('/', " OR ");
     let text = text.trim();
@@ -97,7 +97,7 @@ fn is_permissive(expression: &str) -> bool {
     }
 }
 
-/// Parts between `word`s that stand outside all parentheses, or none if there is no such word.
+/// The parts between occurrences of `word` outside all parentheses; `None` if there are none.
 fn split_outside<'a>(text: &'a str, word: &str) -> Option<Vec<&'a str>> {
     let (mut parts, mut from, mut depth) = (Vec::new(), 0, 0);
     for (i, c) in text.char_indices() {

@@ -1,7 +1,7 @@
 //! Names and messages are in plain words, and only the command line knows its flags.
 //!
-//! Why: a word that is found in no textbook has to be learned, and a message that names a flag helps nobody who calls the library.
-//! How: names of types, functions and files in the sources, and the string literals, tests left out.
+//! Why: a word found in no textbook has to be learned, and a message that names a flag does not help callers of the library.
+//! How: the test checks names of types, functions and files in the sources, and string literals. Tests are left out.
 
 mod sources;
 
@@ -11,20 +11,20 @@ use std::path::{Path, PathBuf};
 
 use sources::{sources, src};
 
-/// Types that once were named so.
+/// Former names of types, which must not come back.
 const TYPES: &[&str] = &[
     "Bar", "Column", "Crew", "Found", "Goodness", "Inquiry", "List", "Missing", "Paged", "Rescue",
     "Room", "Stop", "Talk", "Told", "Wish",
 ];
-/// Words that are no part of a name.
+/// Words that must not be part of a name.
 const PARTS: &[&str] = &[
     "crew", "goodness", "hopeless", "inquiry", "judge", "made", "rims", "tell", "tells", "told",
     "whole", "wish", "wishes",
 ];
-/// Files are not named so.
+/// Words that must not be names of files.
 const FILES: &[&str] =
     &["again", "ahead", "before", "crew", "fine", "held", "keep", "rims", "room", "whole", "wish"];
-/// Words that are in no error message.
+/// Words that must not be in an error message.
 const IN_NO_MESSAGE: &[&str] = &["crew", "made", "told"];
 
 /// Modules whose names are not yet plain.
@@ -89,14 +89,14 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).expect("a source file is readable")
 }
 
-/// All sources, those of some modules left out.
+/// All sources, except those of some modules.
 fn below(root: &Path, but: &[&str]) -> Vec<PathBuf> {
     let mut found = sources(root);
     found.retain(|path| !but.iter().any(|name| path.starts_with(root.join(name))));
     found
 }
 
-/// Names that code declares, each with its keyword.
+/// Names declared in code, each with its keyword.
 fn names(code: &str) -> impl Iterator<Item = (&str, String)> {
     const KEYWORDS: &[&str] = &["enum", "fn", "mod", "struct", "trait", "type"];
     let words: Vec<&str> = code.split_whitespace().collect();
@@ -111,7 +111,7 @@ fn names(code: &str) -> impl Iterator<Item = (&str, String)> {
     pairs.into_iter()
 }
 
-/// The words of a name, in small letters.
+/// The words of a name, in lower case.
 fn parts(name: &str) -> Vec<String> {
     let is_constant = name.chars().all(|c| !c.is_lowercase());
     let mut parts = vec![String::new()];
@@ -127,7 +127,7 @@ fn parts(name: &str) -> Vec<String> {
     parts
 }
 
-/// `--word`, on its own or at the beginning of one.
+/// Returns whether a text contains a flag: `--word` at its beginning or after a character that is neither a letter, a digit nor `-`.
 fn has_flag(text: &str) -> bool {
     text.match_indices("--").any(|(at, _)| {
         let after = text[at + 2..].chars().next();
@@ -166,7 +166,7 @@ fn literals(text: &str) -> Vec<String> {
             found.push(inside[..length].to_owned());
             rest = inside.get(length + 1..).unwrap_or_default();
         } else {
-            // A character, which may be a quote, or a lifetime.
+            // A character literal, which may be a quote, or a lifetime.
             let is_char = rest.starts_with("'\"'") || rest.starts_with("'\\");
             rest = &rest[if is_char { 3 } else { 1 }..];
         }
@@ -174,12 +174,12 @@ fn literals(text: &str) -> Vec<String> {
     found
 }
 
-/// Whether text ends with the word `r`.
+/// Returns whether a text ends with the word `r`.
 fn is_word_r(text: &str) -> bool {
     text.strip_suffix('r').is_some_and(|t| !t.ends_with(|c: char| c.is_alphanumeric() || c == '_'))
 }
 
-/// Where a string's closing quote is.
+/// Position of the closing quote of a string.
 fn closing_quote(text: &str) -> Option<usize> {
     let mut escaped = false;
     text.char_indices().find_map(|(at, c)| {
@@ -189,7 +189,7 @@ fn closing_quote(text: &str) -> Option<usize> {
     })
 }
 
-/// The text without comments, up to the tests at its foot, and without what is declared for tests alone.
+/// The text without comments, without the tests at its end, and without items declared only for tests.
 fn without_tests(text: &str) -> String {
     let mut lines = Vec::new();
     let mut rest = text.lines().peekable();

@@ -134,7 +134,7 @@ pub struct QualityRow {
 pub struct SubdomainRow {
     /// Its number, from 0.
     pub rank: u32,
-    /// The generation of its file that counts.
+    /// Generation of the sub-domain's current file.
     pub generation: u32,
     /// Its state.
     pub state: SubdomainState,
@@ -148,15 +148,15 @@ pub struct SubdomainRow {
     pub interface_faces: u64,
     /// Chunks of tetrahedra, vertices, facets, interface faces, and then blocks of their summaries.
     pub chunks: [u32; 8],
-    /// Of its tetrahedra, as in [`Digest`](crate::digest::Digest).
+    /// Digest of the tetrahedra; see [`Digest`](crate::digest::Digest).
     pub digest: [u64; 2],
-    /// The same of its interface faces.
+    /// Digest of the interface faces.
     pub interface_digest: [u64; 2],
     /// Qualities of its tetrahedra.
     pub quality: QualityRow,
     /// Sum of the volumes in the sealed order.
     pub volume: f64,
-    /// Low and high corner of the box around its vertices.
+    /// Low and high corner of the bounding box.
     pub bounds: [[f64; 3]; 2],
     /// Length of the file.
     pub bytes: u64,
@@ -165,7 +165,7 @@ pub struct SubdomainRow {
 const SUBDOMAIN: &str = "subdomain";
 const COARSE: &str = "coarse";
 
-/// A file of the store that counts: the working or sealed mesh of a sub-domain in one generation.
+/// A current file of the store: the working or sealed mesh of a sub-domain in one generation.
 #[derive(
     Archive,
     Serialize,
@@ -242,7 +242,7 @@ impl CoarseRow {
 pub struct CoarseRow {
     /// Rank of the sub-domain.
     pub rank: u32,
-    /// The generation in the name of its file.
+    /// Generation in the name of the snapshot's file.
     pub generation: u32,
     /// Tetrahedra.
     pub tets: u64,

@@ -1,6 +1,6 @@
-//! Names that last: sub-domains, tetrahedra, vertices.
+//! Lasting ids of sub-domains, tetrahedra and vertices.
 //!
-//! Each is also a number below 2^53, so that programs whose only number is a double can carry it.
+//! Each id is also a number below 2^53, so that programs whose only number is a double can carry it.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,10 +9,10 @@ use thiserror::Error;
 
 /// Bits of the local part of a tetrahedron's number.
 const TET_BITS: u32 = 29;
-/// Owners below this are cuts (0 is the surface), from here on sub-domains.
+/// Owners below this number are cuts (0 is the surface); the others are sub-domains.
 const OWNER_SUBDOMAINS: u32 = 1 << 20;
 
-/// A text that names nothing.
+/// The error for a text that is no id.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{text:?} is not {expected}")]
 pub struct IdError {
@@ -27,10 +27,10 @@ pub struct IdError {
 pub struct SubdomainId(u32);
 
 impl SubdomainId {
-    /// Most sub-domains a store can have: their vertices' owners must stay below 2^21.
+    /// Largest number of sub-domains of a store: the owners of their vertices must stay below 2^21.
     pub const COUNT_MAX: u32 = 1 << 20;
 
-    /// The sub-domain of this rank, if there can be one.
+    /// The sub-domain of this rank; `None` if the rank is too large.
     pub const fn new(rank: u32) -> Option<Self> {
         if rank < Self::COUNT_MAX { Some(Self(rank)) } else { None }
     }
@@ -47,7 +47,7 @@ impl fmt::Display for SubdomainId {
     }
 }
 
-/// A tetrahedron of a sealed sub-domain, shown `7:1048211`. Invariant: `local < LOCAL_MAX`.
+/// A tetrahedron of a sealed sub-domain, displayed as `7:1048211`. Invariant: `local < LOCAL_MAX`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TetId {
     subdomain: SubdomainId,
@@ -55,10 +55,10 @@ pub struct TetId {
 }
 
 impl TetId {
-    /// Most tetrahedra of one sub-domain.
+    /// Largest number of tetrahedra of one sub-domain.
     pub const LOCAL_MAX: u32 = 1 << TET_BITS;
 
-    /// Tetrahedron `local` in the sealed order of `subdomain`, if there can be one.
+    /// Tetrahedron `local` in the sealed order of `subdomain`; `None` if `local` is too large.
     pub const fn new(subdomain: SubdomainId, local: u32) -> Option<Self> {
         if local < Self::LOCAL_MAX { Some(Self { subdomain, local }) } else { None }
     }

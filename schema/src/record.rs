@@ -115,7 +115,7 @@ pub struct SealedTet {
 }
 
 impl SealedTet {
-    /// The same tetrahedron turned so that its smallest vertex leads and the next smallest of the even turns follows.
+    /// The tetrahedron with its nodes evenly permuted: the smallest vertex is first, and the second is the smallest of the other three.
     #[must_use]
     pub fn rotated(self) -> Self {
         // For each leading vertex, an even permutation that brings it to the front.
@@ -202,7 +202,7 @@ pub struct SealedVertex {
 }
 
 impl SealedVertex {
-    /// The id of a vertex of `subdomain`'s own at place `local`.
+    /// The id of a vertex that `subdomain` itself owns, at position `local`.
     pub fn own_id(subdomain: SubdomainId, local: u32) -> u64 {
         VertexId { owner: crate::ids::Owner::Subdomain(subdomain), index: local }.number()
     }
@@ -219,7 +219,7 @@ pub struct SealedFacet {
     pub triangle: u64,
     /// In front (where the normal points to) and behind.
     pub regions: [u32; 2],
-    /// The tetrahedron on each side, or [`NONE`] where that side is not filled or is another's.
+    /// The tetrahedron on each side, or [`NONE`] if that side is not filled or belongs to another sub-domain.
     pub tets: [u32; 2],
 }
 
@@ -238,7 +238,7 @@ pub struct InterfaceFace {
     pub tet: u32,
 }
 
-/// A place that holds no tetrahedron.
+/// Stands for no tetrahedron.
 pub const NO_TET: u32 = NONE;
 
 #[cfg(test)]

@@ -118,7 +118,7 @@ impl Origin {
         }
     }
 
-    /// Whether the part is inside the surface, and was added after its own triangles.
+    /// Returns whether the part is inside the surface, and was added after its own triangles.
     pub fn is_inside(&self) -> bool {
         !matches!(self, Self::File(_) | Self::Sample(_) | Self::Copy)
     }

@@ -23,7 +23,7 @@ pub struct InterfaceSide {
     pub other: u32,
     /// Number of faces.
     pub faces: u64,
-    /// Of the faces, seen from this side.
+    /// Digest of the faces, seen from this side.
     pub digest: Digest,
 }
 

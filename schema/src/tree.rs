@@ -57,7 +57,7 @@ impl RankRange {
         self.path(n).0
     }
 
-    /// The way down from the root: the cuts passed, and the node where it ends.
+    /// The path from the root: the cuts passed, and the node where the path ends.
     fn path(self, n: u32) -> (Vec<u32>, Self) {
         let (mut cuts, mut at) = (Vec::new(), Self::root(n));
         while at != self && at.count > 1 {
@@ -69,7 +69,7 @@ impl RankRange {
     }
 }
 
-/// The ids of one kind of record: handed out in order; freed slots are used again, the last freed first.
+/// Counts of the ids of one kind of record. Ids are assigned in order; freed slots are reused, the last freed first.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IdCounts {
     /// The least id that was never used.
@@ -81,7 +81,7 @@ pub struct IdCounts {
 }
 
 impl IdCounts {
-    /// Of `n` records numbered without gaps.
+    /// Counts of `n` records numbered without gaps.
     pub const fn without_gaps(n: u32) -> Self {
         Self { fresh: sparse(n), free_head: NONE, n_live: n }
     }
@@ -103,13 +103,13 @@ impl Default for IdCounts {
 /// Counts that, with the pages, are the whole state of a working mesh.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeshState {
-    /// Of tetrahedra.
+    /// Counts of tetrahedra.
     pub tets: IdCounts,
-    /// Of vertices.
+    /// Counts of vertices.
     pub vertices: IdCounts,
-    /// Of facets.
+    /// Counts of facets.
     pub facets: IdCounts,
-    /// Of interface faces.
+    /// Counts of interface faces.
     pub interface_faces: IdCounts,
 }
 
@@ -146,7 +146,7 @@ impl MeshState {
         self.tets.n_live
     }
 
-    /// The counts as numbers, for storing beside the pages.
+    /// The counts as numbers, for storing in addition to the pages.
     pub fn to_words(self) -> [u32; MESH_STATE_WORDS] {
         let counts = self.counts().map(|c| [c.fresh, c.free_head, c.n_live]);
         counts.as_flattened().try_into().expect("four times three")
@@ -184,9 +184,9 @@ pub struct SubtreeMesh {
     pub ranks: RankRange,
     /// The generation of the file.
     pub generation: u32,
-    /// How many records there are.
+    /// Counts of the records.
     pub state: MeshState,
-    /// Of each of [`WORKING_KINDS`]: the first page and the number of pages.
+    /// The first page and the number of pages, for each of [`WORKING_KINDS`].
     pub extents: [[u32; 2]; WORKING_KINDS.len()],
     /// Predicted load of the subtree.
     pub load: f64,

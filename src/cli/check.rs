@@ -1,4 +1,4 @@
-//! `check`: can a surface be meshed, what would mend it, what mesh does it allow?
+//! The command `check`: reports whether a surface can be meshed, how to repair it, and what mesh it allows.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ use tetdb_engine::api::targets::check_target;
 use tetdb_engine::api::{Code, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short};
 
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
-    // Options are checked before anything is read.
+    // Options are validated before anything is read.
     if args.repair && (args.sheets.allow_open || args.sheets.files().next().is_some()) {
         return Err(Failure::new(Code::Usage, "a surface is repaired before sheets are embedded")
             .help("repair each file for itself"));
@@ -25,7 +25,7 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     for out in args.write.iter().chain(&args.write_bad) {
         check_target(out, &inputs)?;
     }
-    // A check writes nothing beside what it reads.
+    // A check writes no temporary files next to its input.
     let settings = console.settings(memory::asked(args.memory.as_deref())?, None);
     let sheets = (&args.sheets, false);
     let mut surface = input::load_with(&args.surfaces, sheets, &settings, console)?;
@@ -90,7 +90,7 @@ fn print_repair(report: &RepairReport, console: &Console) {
     ));
 }
 
-/// Writes what was asked for; returns fields of the answer.
+/// Writes the requested files. Returns fields of the answer.
 fn write_files(
     args: &CheckArgs,
     surface: &Surface,
@@ -117,7 +117,7 @@ fn write_files(
         let n = surface.write_defects(report, out)?;
         let mut file = None;
         if n == 0 {
-            // A file without cells is one that some programs cannot read.
+            // Some programs cannot read a file without cells.
             console.note(&format!("no triangle is defective: {} was not written", out.display()));
         } else {
             console.note(&format!("wrote {n} defective triangles to {}", out.display()));

@@ -1,13 +1,13 @@
-//! The report on a surface, for people.
+//! The report on a surface, printed for people.
 
 use super::console::Console;
 use super::words::{self, count};
 use tetdb_engine::api::{Code, Defect, Surface, SurfaceReport, short, show_point};
 
-/// Defects of one kind, holes and junctions listed for people.
+/// Largest number of defects of one kind, of holes and of junctions that are listed.
 const LISTED: usize = 8;
 
-/// A report to be printed; `surfaces` are the words of the command line.
+/// A report to print. `surfaces` are the surfaces as typed on the command line.
 pub struct Printed<'a> {
     pub surface: &'a Surface,
     pub report: &'a SurfaceReport<'a>,
@@ -66,7 +66,7 @@ impl Printed<'_> {
         let same_kind = |a: &Defect, b: &Defect| a.code() == b.code();
         for kind in self.report.validation.defects.chunk_by(same_kind) {
             let code = kind[0].code();
-            // Open edges are told hole by hole.
+            // Open edges are listed by hole.
             if code == Code::OpenSurface {
                 continue;
             }
@@ -195,7 +195,7 @@ impl Printed<'_> {
         let Some(first) = self.report.validation.defects.first() else {
             return;
         };
-        // How to close it was told with the holes.
+        // The list of holes already says how to close them.
         if matches!(first, Defect::OpenEdge { .. }) && self.report.closes().is_some() {
             return;
         }
@@ -203,7 +203,7 @@ impl Printed<'_> {
         let help = if is_dropped && !self.is_repaired {
             format!("`tetdb check {} --repair --write OUT` drops such triangles", self.surfaces)
         } else if matches!(first, Defect::OpenEdge { .. }) {
-            // That no repair does was told with the holes.
+            // The list of holes already says that no repair closes them.
             "close it where the surface was made".to_owned()
         } else {
             first.help().to_owned()
@@ -218,7 +218,7 @@ fn print_rest(n: u64, console: &Console) {
     }
 }
 
-/// Two digits are all an estimate has.
+/// Rounds an estimate to its two significant digits.
 fn rounded(x: f64) -> String {
     let unit = 10f64.powf(x.log10().floor() - 1.0).max(1.0);
     format!("{:.0}", (x / unit).round() * unit)

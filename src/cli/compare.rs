@@ -1,4 +1,4 @@
-//! `compare`: two meshes side by side, as the paper does it.
+//! The command `compare`: two meshes side by side, as in the paper.
 
 use serde_json::json;
 
@@ -8,7 +8,7 @@ use super::failure::Failure;
 use super::memory;
 use tetdb_engine::api::{Comparison, Population, Qualities};
 
-/// Exit code when the meshes differ.
+/// Exit code if the meshes differ.
 const DIFFERENT: u8 = 7;
 
 pub fn run(args: &CompareArgs, console: &Console) -> Result<u8, Failure> {

@@ -1,4 +1,4 @@
-//! The options that shape the mesh, from the command line and a file.
+//! Options of a mesh, from the command line and from a file of options.
 
 use std::path::Path;
 use tetdb_engine::api::{Code, MeshOptions, OptionsText, Seed, SeedKind, Word, typed};
@@ -6,12 +6,12 @@ use tetdb_engine::api::{Code, MeshOptions, OptionsText, Seed, SeedKind, Word, ty
 use super::args::{ShapeArgs, SizeArgs};
 use super::failure::Failure;
 
-/// No configuration is longer.
+/// Largest length of a file of options.
 const BYTES_MAX: u64 = 1 << 20;
 
-/// The options of a run: the command line's over those of the file, and defaults for the rest.
+/// The options of a run. Those of the command line override those of the file; the rest have defaults.
 ///
-/// Lists on the command line replace those of the file. Errors: the file, with its line and column; values without a meaning.
+/// Lists on the command line replace those of the file. Errors: the file, with line and column; values that make no sense.
 pub fn options(args: &ShapeArgs) -> Result<MeshOptions, Failure> {
     let file = match &args.config {
         None => OptionsText::default(),
@@ -25,7 +25,7 @@ pub fn options(args: &ShapeArgs) -> Result<MeshOptions, Failure> {
         }
     };
     typed(file.overridden_by(text_of(args)?)).map_err(|e| match (&args.config, e.option()) {
-        // Words of the command line are known, so this one is the file's.
+        // The command line accepts only known words, so the unknown one comes from the file.
         (Some(path), Some(_)) if e.code() == Code::Usage => {
             bad(e.message().to_owned()).at(path.display())
         }
@@ -33,7 +33,7 @@ pub fn options(args: &ShapeArgs) -> Result<MeshOptions, Failure> {
     })
 }
 
-/// The sizes of the command line.
+/// The sizes given on the command line.
 pub fn sizes_of(args: &SizeArgs) -> OptionsText {
     OptionsText {
         hsiz: args.hsiz.clone(),
@@ -50,7 +50,7 @@ pub fn sizes_of(args: &SizeArgs) -> OptionsText {
     }
 }
 
-/// All options of the command line. Errors: the file of seeds, with its line.
+/// All options given on the command line. Errors: the file of seeds, with its line.
 fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
     let mut text = OptionsText {
         regions: args.regions.map(|regions| regions.word().to_owned()),
@@ -75,7 +75,7 @@ fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
     Ok(text)
 }
 
-/// The seeds of a file. Errors: its line.
+/// Reads a file of seeds. Errors: the line.
 fn seeds(path: &Path) -> Result<Vec<Seed>, Failure> {
     let text = text(path).map_err(|e| {
         Failure::new(Code::UnreadableFile, format!("the file cannot be read: {e}"))
@@ -97,7 +97,7 @@ fn seeds(path: &Path) -> Result<Vec<Seed>, Failure> {
     Ok(seeds)
 }
 
-/// What a file holds. Errors: a pipe or a device, which may have no end; a file that is far too long for options.
+/// Reads a text file. Errors: a pipe or a device, which may never end; a file too long for options.
 fn text(path: &Path) -> std::io::Result<String> {
     let refused = |why: &str| Err(std::io::Error::other(why));
     match std::fs::metadata(path)? {

@@ -1,4 +1,4 @@
-//! Everything that is printed: data on stdout, talk on stderr.
+//! Everything that is printed: the answer on stdout, progress and remarks on stderr.
 
 use std::io::{IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,7 +11,7 @@ use super::failure::{Failure, in_flags};
 use super::words;
 use tetdb_engine::api::{Bytes, CancelToken, Code, Event, Settings, short};
 
-/// Without a terminal, progress is one line in so much time.
+/// Without a terminal, progress is printed as one line per this interval.
 const PLAIN_EVERY: Duration = Duration::from_secs(10);
 
 /// Colors of a terminal.
@@ -19,14 +19,14 @@ const RED: u8 = 31;
 const GREEN: u8 = 32;
 const YELLOW: u8 = 33;
 
-/// Where everything that is printed goes through; clones print to the same terminal.
+/// Printer of everything that the program prints. Clones print to the same terminal.
 #[derive(Clone)]
 pub struct Console {
     json: bool,
-    /// Neither progress nor remarks.
+    /// True if neither progress nor remarks are printed.
     quiet: bool,
     verbose: bool,
-    /// Whether errors and warnings have colors.
+    /// True if errors and warnings are colored.
     colors: bool,
     terminal: bool,
     bar: ProgressBar,
@@ -35,7 +35,7 @@ pub struct Console {
     cancel: CancelToken,
 }
 
-/// What became of the standard output.
+/// State of the standard output.
 #[derive(Default)]
 struct Answer {
     bytes: u64,
@@ -44,9 +44,9 @@ struct Answer {
 
 struct State {
     stage: String,
-    /// When the stage began.
+    /// Start of the stage.
     since: Instant,
-    /// When progress was last printed.
+    /// Time at which progress was last printed.
     printed: Instant,
 }
 
@@ -55,7 +55,7 @@ impl Console {
         Self::with(json, false, false)
     }
 
-    /// One that prints warnings and errors alone, if `quiet`, and internals too, if `verbose`.
+    /// A console that prints only warnings and errors if `quiet`, and also internals if `verbose`.
     pub fn with(json: bool, quiet: bool, verbose: bool) -> Self {
         let terminal = std::io::stderr().is_terminal() && !json && !quiet;
         let bar = if terminal {
@@ -80,12 +80,12 @@ impl Console {
         }
     }
 
-    /// What ends the runs of this command.
+    /// Token that ends the runs of this command.
     pub fn cancel(&self) -> &CancelToken {
         &self.cancel
     }
 
-    /// How a run works: with this much memory and so many threads, where they are given; it reports here.
+    /// Settings of a run that reports to this console, with the given memory and number of threads, or defaults.
     pub fn settings(&self, memory: Option<u64>, threads: Option<usize>) -> Settings {
         let console = self.clone();
         let mut settings = Settings::new().cancel(&self.cancel);
@@ -112,22 +112,22 @@ impl Console {
         }
     }
 
-    /// Whether the answer is JSON.
+    /// Returns whether the answer is JSON.
     pub fn is_json(&self) -> bool {
         self.json
     }
 
-    /// Whether only what is asked for is printed.
+    /// Returns whether only the requested answer is printed.
     pub fn is_quiet(&self) -> bool {
         self.quiet
     }
 
-    /// Whether internals are printed.
+    /// Returns whether internals are printed.
     pub fn is_verbose(&self) -> bool {
         self.verbose
     }
 
-    /// A word in a color of the terminal, where there is one.
+    /// A word in a terminal color, if colors are used.
     fn colored(&self, color: u8, word: &str) -> String {
         match self.colors {
             true => format!("\x1b[1;{color}m{word}\x1b[0m"),
@@ -135,14 +135,14 @@ impl Console {
         }
     }
 
-    /// A remark.
+    /// Prints a remark.
     pub fn note(&self, text: &str) {
         if !self.quiet {
             self.print(text);
         }
     }
 
-    /// A remark that is never left out.
+    /// Prints a remark that is never suppressed.
     pub fn warn(&self, text: &str) {
         let word = match self.json {
             true => "warning:".to_owned(),
@@ -159,19 +159,19 @@ impl Console {
         }
     }
 
-    /// What an answer has cost, for programs.
+    /// Prints the cost of an answer, for programs.
     pub fn measures(&self, value: &serde_json::Value) {
         if self.json && !self.quiet {
             self.stderr_json(&serde_json::json!({ "measures": value }));
         }
     }
 
-    /// One line of the answer.
+    /// Prints one line of the answer.
     pub fn line(&self, text: &str) {
         self.write(format!("{text}\n").as_bytes());
     }
 
-    /// Bytes of the answer. Returns whether anybody still takes them.
+    /// Prints bytes of the answer. Returns false once writing has failed, as when the reader is gone.
     pub fn write(&self, bytes: &[u8]) -> bool {
         let mut answer = self.answer.lock().unwrap_or_else(PoisonError::into_inner);
         if answer.refused.is_none() {
@@ -183,7 +183,7 @@ impl Console {
         answer.refused.is_none()
     }
 
-    /// Ends the answer. Errors: it could not be written, and not because its reader has enough.
+    /// Ends the answer. Errors: it could not be written, for another reason than that its reader has closed the pipe.
     pub fn end_answer(&self) -> Result<(), Failure> {
         let mut answer = self.answer.lock().unwrap_or_else(PoisonError::into_inner);
         if let (None, Err(error)) = (&answer.refused, std::io::stdout().flush()) {
@@ -195,14 +195,14 @@ impl Console {
         }
     }
 
-    /// The whole answer for programs.
+    /// Prints the whole answer for programs.
     pub fn answer<T: Serialize>(&self, value: &T) {
         if let Ok(text) = serde_json::to_string(value) {
             self.line(&text);
         }
     }
 
-    /// Progress; called often.
+    /// Shows progress; called often.
     pub fn progress(&self, stage: &'static str, done: u64, total: Option<u64>, unit: &'static str) {
         if self.quiet {
             return;
@@ -216,7 +216,7 @@ impl Console {
         }
         if self.terminal {
             if new_stage {
-                // Resetting draws.
+                // Resetting draws the bar.
                 self.bar.set_style(style(total.is_some()));
                 self.bar.set_message(stage.to_owned());
                 self.bar.reset();
@@ -228,7 +228,7 @@ impl Console {
         } else if now - state.printed >= PLAIN_EVERY {
             state.printed = now;
             let seconds = (now - state.since).as_secs_f64();
-            // Where several work side by side stages alternate, and a stage just begun has no rate.
+            // With parallel work, stages alternate; a stage that has just begun has no meaningful rate.
             let rate = (seconds > 1.0).then(|| done as f64 / seconds);
             let eta = total
                 .zip(rate)
@@ -248,7 +248,7 @@ impl Console {
         }
     }
 
-    /// Takes the progress bar away.
+    /// Removes the progress bar.
     pub fn done(&self) {
         self.bar.finish_and_clear();
     }
@@ -282,12 +282,12 @@ impl Console {
     }
 }
 
-/// A line of talk. That nobody hears it is no reason to end.
+/// Prints a line to stderr. A closed stderr is no reason to end.
 fn say(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// The standard output took no more; `written` says how much it took. Errors: unless its reader has enough.
+/// Handles a failed write to the standard output; `written` says how much was written. A reader that closed the pipe is no error.
 pub(super) fn unwritten(error: &std::io::Error, written: &str) -> Result<(), Failure> {
     use std::io::ErrorKind::{BrokenPipe, StorageFull};
     let code = match error.kind() {

@@ -1,4 +1,4 @@
-//! `digest`: one number for the mesh.
+//! The command `digest`: the digest of a mesh.
 
 use serde_json::json;
 

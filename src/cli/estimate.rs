@@ -1,4 +1,4 @@
-//! `estimate`: a mesh and what it takes, before it is begun.
+//! The command `estimate`: predicts a mesh and its cost before a run.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let settings = console.settings(Some(cap), threads::asked(args.threads)?);
     let threads = settings.n_threads();
     let store = args.output.as_deref().unwrap_or(Path::new("."));
-    // The cap is that of the run to come; what is said of it needs the surface, however large.
+    // `cap` belongs to the planned run. The estimate itself needs the surface in memory, however large.
     let wide = console.settings(Some(cap.max(default_cap().0)), args.threads);
     let (wide, sheets) = (input::beside(wide, store), (&args.sheets, options.refine_surface));
     let surface = input::load_with(&args.surfaces, sheets, &wide, console)?;

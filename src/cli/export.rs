@@ -1,4 +1,4 @@
-//! `export`: files for other programs.
+//! The command `export`: files for other programs.
 
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// What this rank writes of pieces, unless that was said; what is no piece the first one writes.
+/// This rank's share of the pieces, if the user gave none. Files that are no pieces are written by the first rank.
 fn share_of_ranks() -> Option<Share> {
     #[cfg(feature = "mpi")]
     return super::ranks::share();
@@ -41,7 +41,7 @@ fn share_of_ranks() -> Option<Share> {
     None
 }
 
-/// The ranks as writers of one file, where there are several.
+/// The ranks as joint writers of one file; `None` for a single process.
 fn writers() -> Option<Box<dyn Writers>> {
     #[cfg(feature = "mpi")]
     return super::ranks::writers();
@@ -49,7 +49,7 @@ fn writers() -> Option<Box<dyn Writers>> {
     None
 }
 
-/// Adds what another rank wrote.
+/// Adds the files and counts of other ranks.
 #[cfg(feature = "mpi")]
 fn add(all: &mut [Exported], others: Vec<Exported>, console: &Console) {
     for (exported, other) in all.iter_mut().zip(others) {
@@ -107,7 +107,7 @@ fn write_share(
     Ok(reports)
 }
 
-/// The options of these arguments. Errors: what has no meaning, what the store does not have.
+/// The options from these arguments. Errors: values that make no sense; parts that the store does not have.
 fn options(args: &ExportArgs, settings: &Settings) -> Result<ExportOptions, Failure> {
     let mut options = ExportOptions::new().subdomains(&args.subdomain);
     if let Some(word) = &args.format {
@@ -139,7 +139,7 @@ fn options(args: &ExportArgs, settings: &Settings) -> Result<ExportOptions, Fail
     Ok(given.fold(options, |options, (_, add)| add(options)))
 }
 
-/// The question about all tetrahedra whose answer is to be written, where that is asked for: rows of values.
+/// The query whose answer is exported, for a file of rows.
 fn rows(args: &ExportArgs) -> Result<Option<QueryArgs>, Failure> {
     let word = |out: &PathBuf| match &args.format {
         Some(word) => word.to_ascii_lowercase(),
@@ -179,7 +179,7 @@ fn rows(args: &ExportArgs) -> Result<Option<QueryArgs>, Failure> {
     }))
 }
 
-/// Refuses names whose format cannot be told, before any work.
+/// Refuses a file name without a known format, before any work.
 pub fn check_format(out: &Path) -> Result<(), Failure> {
     match MeshFormat::from_extension(out) {
         Some(_) => Ok(()),
@@ -192,7 +192,7 @@ pub fn check_format(out: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Writes the whole mesh, also over an input: which files may be written was checked before the run.
+/// Writes the whole mesh, even over an input. The names of the files were checked before the run.
 pub fn write(
     path: &Path,
     out: &Path,

@@ -1,9 +1,9 @@
-//! Errors as the user sees them: a word, an exit code, what happened, where, what to do.
+//! Errors as the user sees them: code, exit code, message, place, help.
 
 use tetdb_engine::api::error::{Error, Remedy};
 use tetdb_engine::api::{Code, SizeWarning};
 
-/// An error on its way to the user.
+/// An error to be printed.
 #[derive(Debug)]
 pub struct Failure {
     pub code: Code,
@@ -27,7 +27,7 @@ impl Failure {
         self
     }
 
-    /// The exit code of its word.
+    /// The exit code.
     pub fn exit(&self) -> u8 {
         match self.code {
             Code::Stopped => super::signals::exit_code(),
@@ -37,7 +37,7 @@ impl Failure {
 }
 
 impl From<Error> for Failure {
-    /// What helps, in the words of the command line.
+    /// Converts an error, with help in terms of the command line.
     fn from(e: Error) -> Self {
         let help = match e.remedy {
             Remedy::Memory(least) => {
@@ -58,12 +58,12 @@ impl From<Error> for Failure {
     }
 }
 
-/// The option of a file of options as it is typed.
+/// The command-line flag of an option in a file of options.
 fn flag(option: &str) -> String {
     format!("--{}", option.replace('_', "-"))
 }
 
-/// A warning in the words of the command line.
+/// A warning in terms of command-line flags.
 pub fn in_flags(warning: &SizeWarning) -> String {
     let help = match warning.needs_finer_surface() {
         true => "; refine it first with `tetdb refine-surface SURFACE FINE --hsiz H`",

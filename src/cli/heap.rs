@@ -1,35 +1,35 @@
-//! How the C library keeps memory that was given back: not at all, where it is large.
+//! Settings of the C library's allocator: large blocks are returned to the system when they are freed.
 //!
-//! The ledger counts what is held. But the allocator of the GNU C library keeps what a thread gave back for that thread's next
-//! requests, and learns from each large block that is freed to keep blocks of its size, up to 32 MiB. Measured: a run in six sub-domains
-//! with two threads and a cap of 224 MiB held 199 MiB at most and had 339 MiB resident; with blocks from 256 KiB on mapped for themselves
-//! and few heaps, which are swept, 258 MiB.
+//! The budget counts the memory that the program holds. But the allocator of the GNU C library keeps memory that a thread freed for
+//! later requests of this thread. Each large block that is freed also raises the size of blocks that it keeps, up to 32 MiB. Measured on
+//! a run in six sub-domains with two threads and a cap of 224 MiB: it held at most 199 MiB and had 339 MiB resident. With blocks from
+//! 256 KiB on mapped separately and few heaps, which are swept, it had 258 MiB.
 
 /// Blocks of this many bytes go back to the system when they are freed.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const MAPPED_FROM: i32 = 256 << 10;
 
-/// Heaps for all threads. With one they wait for each other: a surface whose mesh is mostly mended took two threads as long as one. With four, two
-/// threads have 1 MiB more resident at most.
+/// Heaps for all threads. With one heap, threads wait for each other: a run that mostly mends bad tetrahedra took two threads as long as
+/// one. With four, two threads have at most 1 MiB more resident.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const HEAPS: i32 = 4;
 
-/// Sets the allocator up. To be called before there are threads.
+/// Configures the allocator. Must be called before any thread starts.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[allow(unsafe_code)]
 pub fn keep_little() {
-    // SAFETY: `mallopt` takes two numbers and changes only how the allocator works from now on; no other thread exists yet. An answer
-    // of 0 means that the setting is not known, and costs nothing but memory.
+    // SAFETY: `mallopt` takes two numbers and changes only how the allocator works from now on; no other thread exists yet. A result of
+    // 0 means that the setting is unknown, which costs only memory.
     unsafe {
         libc::mallopt(libc::M_ARENA_MAX, HEAPS);
         libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED_FROM);
     }
 }
 
-/// Gives back, from now on and every so often, the pages of smaller blocks in which nothing lies any more.
+/// Starts a thread that regularly returns unused pages of the heaps to the system.
 ///
-/// Blocks of all ages lie side by side in a heap, so that its end hardly ever falls free. Measured: 20 million tetrahedra with two threads
-/// and a cap of 128 MiB had 160 MiB resident at most, without this 170 MiB (one heap).
+/// Blocks of all ages share a heap, so its end is hardly ever free. Measured on 20 million tetrahedra with two threads and a cap of 128
+/// MiB: at most 160 MiB resident, and 170 MiB without this thread (one heap).
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[allow(unsafe_code)]
 pub fn keep_sweeping() {
@@ -42,7 +42,7 @@ pub fn keep_sweeping() {
             }
         }
     };
-    // Without the thread all works as well, with more memory.
+    // Without the thread everything works, with more memory.
     let _ = std::thread::Builder::new().name("heap".into()).spawn(sweep);
 }
 
@@ -50,10 +50,10 @@ pub fn keep_sweeping() {
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const EVERY: std::time::Duration = std::time::Duration::from_millis(100);
 
-/// Other allocators are left as they are.
+/// Does nothing for other allocators.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub fn keep_little() {}
 
-/// Other allocators are left as they are.
+/// Does nothing for other allocators.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub fn keep_sweeping() {}

@@ -1,4 +1,4 @@
-//! `info`: what a store holds.
+//! The command `info`: the contents of a store.
 
 use std::path::Path;
 
@@ -14,15 +14,15 @@ use tetdb_engine::api::{
     Excess, QualityRow, RegionInfo, Store, StoreInfo, StoreState, Tasks, short,
 };
 
-/// Regions listed for people.
+/// Largest number of regions listed one by one.
 const REGIONS_LISTED: usize = 12;
-/// Bytes per tetrahedron are shown of meshes with so many.
+/// Least number of tetrahedra for which bytes per tetrahedron are shown.
 const TETS_MEASURED: u64 = 10_000;
-/// Sub-domains listed for people.
+/// Largest number of sub-domains listed.
 const SUBDOMAINS_LISTED: usize = 32;
 
 pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
-    // The rows of a catalog are far less than the least cap.
+    // The rows of a catalog take far less than the smallest cap.
     let memory = memory::asked(args.of.memory.as_deref())?;
     let path = &args.of.store;
     let excess = (args.excess)
@@ -48,7 +48,7 @@ pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// Everything, for programs.
+/// The whole record, for programs.
 pub fn object(path: &Path) -> Result<Value, Failure> {
     let mut all = json!(StoreInfo::read(path)?);
     all["schema"] = json!(1);
@@ -56,12 +56,12 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
     Ok(all)
 }
 
-/// A digest as it is shown.
+/// A digest as text.
 pub fn hex(digest: [u64; 2]) -> String {
     tetdb_engine::data::schema::digest::Digest { lanes: digest }.to_string()
 }
 
-/// The same for people.
+/// Prints the record for people.
 pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     let info = StoreInfo::read(path)?;
     let surfaces: Vec<&str> = info.surfaces.iter().map(|s| s.path.as_str()).collect();
@@ -90,7 +90,7 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         info.vertices,
         match info.input_triangles {
             Some(n) => count(n, "input triangle"),
-            // Those between sub-domains are in both.
+            // Faces between sub-domains count in both of them.
             None => {
                 let n: u64 = info.subdomains.iter().map(|part| part.facets).sum();
                 format!("at most {n} input triangles")
@@ -116,7 +116,7 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Bytes of each part of the store.
+/// Prints the bytes of each part of the store.
 fn print_bytes(info: &StoreInfo, console: &Console) {
     if info.n_previous > 0 {
         console.line(&format!(
@@ -133,7 +133,7 @@ fn print_bytes(info: &StoreInfo, console: &Console) {
         ("coarse snapshots, from which sub-domains can be meshed again", info.coarse_bytes),
         ("catalog, with the wanted sizes", info.catalog_bytes),
     ] {
-        // Of a small mesh the least a file takes says nothing of a tetrahedron.
+        // In a small mesh, the minimum size of a file hides the bytes per tetrahedron.
         let each = match info.tets >= TETS_MEASURED {
             true => format!(", {} bytes per tetrahedron", short(bytes as f64 / info.tets as f64)),
             false => String::new(),
@@ -161,7 +161,7 @@ fn print_subdomains(info: &StoreInfo, console: &Console) {
     }
 }
 
-/// Few regions one by one, many as a whole.
+/// Prints few regions one by one, many as a summary.
 fn print_regions(regions: &[RegionInfo], labels: &[String], console: &Console) {
     if regions.len() > REGIONS_LISTED {
         let (filled, empty): (Vec<_>, Vec<_>) = regions.iter().partition(|r| r.row.filled);
@@ -205,12 +205,12 @@ fn state_words(state: StoreState) -> &'static str {
     }
 }
 
-/// Percent of tetrahedra with a quality below 2.
+/// Percentage of tetrahedra with a quality below 2.
 pub fn share_below_two(q: &QualityRow) -> f64 {
     100.0 * q.bins[0] as f64 / q.bins.iter().sum::<u64>().max(1) as f64
 }
 
-/// The paper's table: share and number of tetrahedra by quality.
+/// The table of the paper: share and number of tetrahedra by quality.
 fn quality_lines(q: &QualityRow) -> Vec<String> {
     let total: u64 = q.bins.iter().sum();
     let mut lines = vec!["quality q (1 is regular, larger is worse):".to_owned()];
@@ -227,7 +227,7 @@ fn quality_lines(q: &QualityRow) -> Vec<String> {
     lines
 }
 
-/// A share in percent, in at most four digits, but never 100 % when it is not all.
+/// A share in percent, in at most four digits. Never rounded up to 100 %.
 fn share(n: u64, total: u64) -> String {
     let percent = 100.0 * n as f64 / total.max(1) as f64;
     if n < total && percent >= 99.995 {
@@ -239,7 +239,7 @@ fn share(n: u64, total: u64) -> String {
     short(percent)
 }
 
-/// A quality in four digits, or as many as keep it in its row of the table.
+/// A quality in four digits, or in as many as keep it within its row of the table.
 fn worst(q: f64) -> String {
     let text = short(q);
     let is_in_its_row = text.parse::<f64>().is_ok_and(|shown| shown.floor() == q.floor());

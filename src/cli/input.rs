@@ -1,4 +1,4 @@
-//! Surfaces as arguments: files, or samples generated on the spot.
+//! Surfaces given as arguments: files, or generated samples.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use super::failure::Failure;
 use super::words::count;
 use tetdb_engine::api::{Code, EmbeddedKind, Settings, Surface};
 
-/// The same settings with temporary files in the folder of `file`, or the nearest above it that exists.
+/// The same settings, with temporary files in the folder of `file` or its nearest existing parent.
 pub fn beside(settings: Settings, file: &Path) -> Settings {
     let absolute = std::path::absolute(file).unwrap_or_default();
     let above = absolute.ancestors().skip(usize::from(file != Path::new(".")));
@@ -18,8 +18,9 @@ pub fn beside(settings: Settings, file: &Path) -> Settings {
     }
 }
 
-/// Reads files or generates a sample, and embeds sheets, edges and points. Triangles are divided where edges and points lie on them
-/// if the surface `divides`.
+/// Reads files or generates a sample, and embeds sheets, edges and points.
+///
+/// If the surface `divides`, triangles are divided where edges and points lie on them.
 pub fn load_with(
     arguments: &[String],
     (sheets, divides): (&SheetArgs, bool),

@@ -1,4 +1,4 @@
-//! What the user typed, what it means, one file per command.
+//! The command line: parsing, one file for each command, printing.
 
 #![warn(missing_docs)]
 
@@ -70,7 +70,7 @@ pub fn run() -> ExitCode {
     run_alone()
 }
 
-/// Rank 0 is the program as ever; of the others only that one says what is wrong with the command line.
+/// Runs one rank of an MPI program. Rank 0 runs as without MPI, and is the only one that reports errors of the command line.
 #[cfg(feature = "mpi")]
 fn run_rank(ranks: &Ranks) -> ExitCode {
     if ranks.is_first() {
@@ -99,7 +99,7 @@ fn run_rank(ranks: &Ranks) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Signals end the run from now on.
+/// Lets signals end the run from now on.
 fn listen(console: &Console) {
     let is_json = console.is_json();
     signals::listen(console.cancel(), move || Console::new(is_json).fail(&Error::stopped().into()));
@@ -123,7 +123,7 @@ fn run_alone() -> ExitCode {
     ExitCode::from(exit)
 }
 
-/// Says what is wrong with the command line; help and version are no errors and go to stdout.
+/// Reports an error of the command line. Help and version are no errors and go to stdout.
 fn unparsed(error: &clap::Error) -> ExitCode {
     let is_help = error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
     if is_help || !error.use_stderr() {
@@ -164,7 +164,7 @@ fn unparsed(error: &clap::Error) -> ExitCode {
     ExitCode::from(Console::new(is_json).fail(&Failure::new(Code::Usage, message).help(help)))
 }
 
-/// Whether what was not expected is a number behind another one.
+/// Returns whether the unexpected argument is a number that follows another one.
 fn is_apart(error: &clap::Error) -> bool {
     let is_number = |word: &str| word.trim_end_matches(',').parse::<f64>().is_ok();
     let Some(ContextValue::String(found)) = error.get(ContextKind::InvalidArg) else {
@@ -172,7 +172,7 @@ fn is_apart(error: &clap::Error) -> bool {
     };
     let words: Vec<String> =
         std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
-    // Of one with a minus only the sign and the first digit are named.
+    // For a negative number, clap names only the sign and the first digit.
     (words.windows(2))
         .any(|two| is_number(&two[0]) && is_number(&two[1]) && two[1].starts_with(found.as_str()))
 }
@@ -209,7 +209,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
     }
 }
 
-/// Whether a command that ended at once would leave something half done from the start.
+/// Returns whether a command, if it ended at once, could leave a half-written file from the start.
 fn writes_files(command: &Command) -> bool {
     matches!(
         command,

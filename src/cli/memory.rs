@@ -1,4 +1,4 @@
-//! Sizes of memory as typed.
+//! Sizes of memory as typed on the command line.
 
 use super::failure::Failure;
 use tetdb_engine::api::Code;
@@ -6,12 +6,12 @@ pub use tetdb_engine::api::peak_bytes as peak;
 pub(super) use tetdb_engine::api::show_bytes as show;
 use tetdb_engine::api::{MEMORY_LEAST, default_cap};
 
-/// The cap in bytes: what is asked for, or a share of what is free. Errors: as [`asked`].
+/// The cap in bytes: the requested one, or a share of the free memory. Errors: as [`asked`].
 pub fn cap(option: Option<&str>) -> Result<u64, Failure> {
     Ok(asked(option)?.unwrap_or_else(|| default_cap().0))
 }
 
-/// The cap that is asked for. Errors: no size; less than any run needs.
+/// The requested cap. Errors: it is no size; it is below the minimum of any run.
 pub fn asked(option: Option<&str>) -> Result<Option<u64>, Failure> {
     let Some(text) = option else { return Ok(None) };
     let bytes = parse(text)?;
@@ -24,7 +24,7 @@ pub fn asked(option: Option<&str>) -> Result<Option<u64>, Failure> {
     Ok(Some(bytes))
 }
 
-/// Reads `512MiB`, `8G`, `2GB`.
+/// Parses sizes such as `512MiB`, `8G`, `2GB`.
 pub fn parse(text: &str) -> Result<u64, Failure> {
     let bad = |why: &str| {
         Failure::new(Code::BadMemory, format!("'{text}' is not a memory size: {why}"))

@@ -1,4 +1,4 @@
-//! `mesh` and `resume`.
+//! The commands `mesh` and `resume`.
 
 use std::path::{Path, PathBuf};
 
@@ -58,7 +58,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     finish(&path, &args.run, &settings, created.traffic, console)
 }
 
-/// What can be done with a coarse mesh.
+/// Prints how to continue with a coarse mesh.
 fn begun(path: &Path, settings: &Settings, console: &Console) -> Result<u8, Failure> {
     if console.is_json() {
         let mut answer = info::object(path)?;
@@ -82,7 +82,7 @@ pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
     finish(&args.store, &args.run, &settings, created.traffic, console)
 }
 
-/// Threads, signals, and the cap; nothing that is written may be one of `inputs`.
+/// Sets up threads, signals and the cap. Refuses outputs that are among `inputs`.
 pub(super) fn begin(
     args: &RunArgs,
     inputs: &[PathBuf],
@@ -114,7 +114,7 @@ fn output(args: &MeshArgs) -> PathBuf {
     })
 }
 
-/// Exports, and a summary.
+/// Exports the mesh and prints a summary.
 fn finish(
     path: &Path,
     args: &RunArgs,

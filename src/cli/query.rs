@@ -1,4 +1,4 @@
-//! `query`: tetrahedra by place, number, neighborhood or condition.
+//! The command `query`: tetrahedra by position, number, neighborhood or condition.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, stdin};
@@ -15,13 +15,13 @@ use tetdb_engine::api::{
     inputs_of,
 };
 
-/// Memory of a point on its way to its answer.
+/// Memory for one point while it is answered, in bytes.
 const POINT_BYTES: u64 = 512;
-/// No line of a point is longer.
+/// Largest length of a line with a point.
 const LINE_MAX: u64 = 4096;
-/// The place of excess among the variables.
+/// Position of excess among the variables.
 const EXCESS: usize = VARIABLES.len() - 1;
-/// Points answered together, at most.
+/// Largest number of points answered together.
 const POINTS_MAX: u64 = 1 << 17;
 
 pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
@@ -46,7 +46,7 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// Answers with tetrahedra. Returns how many.
+/// Prints the selected tetrahedra. Returns their number.
 fn select(
     args: &QueryArgs,
     store: &mut Store,
@@ -150,7 +150,7 @@ fn columns(args: &QueryArgs) -> Result<Vec<AnswerColumn>, Failure> {
     Ok(columns)
 }
 
-/// The variable answers are sorted by, and in which order.
+/// The variable by which answers are sorted, and the order.
 fn order(args: &QueryArgs) -> Result<Option<(&str, Order)>, Failure> {
     let Some(text) = &args.order_by else {
         return Ok(None);
@@ -167,7 +167,7 @@ fn order(args: &QueryArgs) -> Result<Option<(&str, Order)>, Failure> {
     Ok(Some((name, order)))
 }
 
-/// Answers points in blocks that fit the memory. Returns how many are in the mesh.
+/// Answers points in blocks that fit in memory. Returns the number of points inside the mesh.
 fn locate(
     args: &QueryArgs,
     store: &mut Store,
@@ -215,7 +215,7 @@ fn opened(path: &Path) -> Result<Box<dyn BufRead>, Failure> {
     Ok(Box::new(BufReader::new(file)))
 }
 
-/// The next line, or `None` at the end. Errors: one too long for three numbers, as a device without end gives.
+/// Reads the next line; `None` at the end. Errors: a line too long for three numbers, as from an endless device.
 fn line(from: &mut dyn BufRead) -> std::io::Result<Option<String>> {
     let mut line = String::new();
     let n = from.take(LINE_MAX).read_line(&mut line)?;
@@ -232,7 +232,7 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
         .help("check the path and its permissions")
 }
 
-/// Three numbers with commas or spaces between; nothing in empty lines and behind `#`.
+/// Parses three numbers separated by commas or spaces. Empty lines and text after `#` are skipped.
 fn parse_line(path: &Path, number: u64, line: &str) -> Result<Option<[f64; 3]>, Failure> {
     let text = line.split('#').next().unwrap_or_default().trim();
     if text.is_empty() {

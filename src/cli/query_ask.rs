@@ -1,20 +1,20 @@
-//! What a query asks for: words to places, ids and conditions.
+//! Parsing of query arguments into positions, ids and conditions.
 
 use super::args::QueryArgs;
 use super::failure::Failure;
 use tetdb_engine::api::{Code, Condition, ExprError, Query, Store, Summary};
 
-/// An option's value that makes no sense.
+/// The error for an option with a value that makes no sense.
 pub fn bad(option: &str, found: &str, expected: &str) -> Failure {
     Failure::new(Code::BadQuery, format!("{option} {found}: expected {expected}"))
         .help("`tetdb query --help` has examples")
 }
 
-/// An expression that cannot be read, with a caret under the place.
+/// The error for an invalid expression, with a caret under the place.
 fn bad_expression(text: &str, error: &ExprError) -> Failure {
     let line: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let before = text[..error.at].chars().count();
-    // The place is told behind "  at: ".
+    // The place is printed after "  at: ".
     let caret = format!("{:1$}^", "", before + "  at: ".len());
     Failure::new(Code::BadExpression, error)
         .at(format!("{line}\n{caret}"))
@@ -34,12 +34,12 @@ pub fn numbers<const N: usize>(
     parsed.and_then(|list| list.try_into().ok()).ok_or_else(|| bad(option, text, expected))
 }
 
-/// A point as typed.
+/// Parses a point.
 pub fn point(option: &str, text: &str) -> Result<[f64; 3], Failure> {
     numbers(option, text, "three numbers such as 0.1,0.2,0.3")
 }
 
-/// Words separated by commas, each read by its kind.
+/// Parses values separated by commas.
 fn list<T: std::str::FromStr>(option: &str, text: &str, expected: &str) -> Result<Vec<T>, Failure> {
     let parsed: Option<Vec<T>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
     parsed.ok_or_else(|| bad(option, text, expected))
@@ -47,7 +47,7 @@ fn list<T: std::str::FromStr>(option: &str, text: &str, expected: &str) -> Resul
 
 const RANKS: &str = "numbers such as 0,3";
 
-/// The query of these arguments. Errors: what has no meaning, what the store does not have.
+/// Builds the query of these arguments. Errors: values that make no sense; parts that the store does not have.
 pub fn query<'s>(args: &QueryArgs, store: &'s mut Store) -> Result<Query<'s>, Failure> {
     let summary = store.summary();
     if args.inside && args.boxes.is_empty() && args.sphere.is_empty() {
@@ -108,7 +108,7 @@ pub fn query<'s>(args: &QueryArgs, store: &'s mut Store) -> Result<Query<'s>, Fa
     Ok(query)
 }
 
-/// Regions by number or name.
+/// Parses regions, given by number or name.
 pub(super) fn regions(text: &str, summary: &Summary) -> Result<Vec<u32>, Failure> {
     let mut found = Vec::new();
     for word in text.split(',').map(str::trim) {
@@ -151,7 +151,7 @@ fn places<'s>(args: &QueryArgs, mut query: Query<'s>) -> Result<Query<'s>, Failu
     Ok(query)
 }
 
-/// A truth about the variables of a query.
+/// Parses a condition on the variables of a query.
 pub fn condition(text: &str) -> Result<Condition, Failure> {
     Condition::parse(text).map_err(|error| bad_expression(text, &error))
 }

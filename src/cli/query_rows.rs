@@ -1,4 +1,4 @@
-//! Answers of a query on their way out: a table, values, objects, files.
+//! Output of a query's answers: a table, values, JSON objects, files.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use super::console::Console;
 use super::failure::Failure;
 use tetdb_engine::api::{AnswerColumn, AnswerFile, AnswerRow, AnswerValue, csv_head};
 
-/// A number for people: seven digits or so.
+/// Formats a number for people, with about seven digits.
 fn shown(x: f64) -> String {
     match x.abs() {
         0.0 => "0".to_owned(),
@@ -15,7 +15,7 @@ fn shown(x: f64) -> String {
     }
 }
 
-/// Where rows go.
+/// Destination of the rows.
 pub enum Sink {
     Table,
     Values,
@@ -23,7 +23,7 @@ pub enum Sink {
     File(Box<AnswerFile>, PathBuf),
 }
 
-/// A line of a table; all rows have the widths of the head.
+/// A line of a table. All rows have the widths of the head.
 fn line(columns: &[AnswerColumn], row: Option<&AnswerRow>) -> String {
     let mut line = String::new();
     for &column in columns {
@@ -53,15 +53,15 @@ fn line(columns: &[AnswerColumn], row: Option<&AnswerRow>) -> String {
     line.trim_end().to_owned()
 }
 
-/// Lines are collected to so many bytes.
+/// Lines are collected up to this many bytes.
 const LINES_BYTES: usize = 8 << 10;
 
-/// Writes rows; to the standard output until it is closed.
+/// Writer of rows. Writing to the standard output stops when it is closed.
 pub struct Writer {
     sink: Sink,
     columns: Vec<AnswerColumn>,
     console: Console,
-    /// Lines on their way to the standard output.
+    /// Lines not yet written to the standard output.
     lines: String,
     closed: bool,
 }
@@ -91,7 +91,7 @@ impl Writer {
         self.lines.clear();
     }
 
-    /// Writes a row; `false` when nobody listens any more.
+    /// Writes a row. Returns `false` once writing to the standard output has failed.
     pub fn put(&mut self, row: &AnswerRow) -> Result<bool, Failure> {
         let text = match &mut self.sink {
             Sink::Table => line(&self.columns, Some(row)),
@@ -106,7 +106,7 @@ impl Writer {
         Ok(!self.closed)
     }
 
-    /// Ends the answer; of a file, returns its name and length.
+    /// Ends the answer. For a file, returns its name and length.
     pub fn finish(mut self) -> Result<Option<(PathBuf, u64)>, Failure> {
         self.flush();
         match self.sink {

@@ -1,4 +1,4 @@
-//! The ranks of an MPI program, of which this process is one.
+//! The ranks of an MPI program, seen from this process.
 
 use std::sync::OnceLock;
 
@@ -11,9 +11,9 @@ use tetdb_engine::api::{Settings, Share, Writers};
 
 static RANKS: OnceLock<Ranks> = OnceLock::new();
 
-/// The ranks of this program; `None` where no launcher of MPI has started it.
+/// The ranks of this program; `None` if it was started without an MPI launcher.
 ///
-/// Errors: a launcher of another MPI has.
+/// Errors: it was started by the launcher of another MPI.
 pub(super) fn begin() -> Result<Option<Ranks>, Failure> {
     let ranks = Ranks::begin()?;
     if let Some(ranks) = ranks.as_ref().filter(|ranks| !ranks.is_alone()) {
@@ -22,17 +22,17 @@ pub(super) fn begin() -> Result<Option<Ranks>, Failure> {
     Ok(ranks)
 }
 
-/// This rank's share of work that all ranks do; `None` where there are no others.
+/// This rank's share of work divided among all ranks; `None` if there are no others.
 pub(super) fn share() -> Option<Share> {
     RANKS.get().map(Ranks::share)
 }
 
-/// The ranks as writers of one file; `None` where there are no others.
+/// The ranks as joint writers of one file; `None` if there are no others.
 pub(super) fn writers() -> Option<Box<dyn Writers>> {
     RANKS.get().map(Ranks::shared_file)
 }
 
-/// Lets a run of rank 0 use the other ranks, where there are any.
+/// Lets a run of rank 0 use the other ranks, if any.
 pub(super) fn share_work(settings: Settings) -> Settings {
     match RANKS.get() {
         Some(ranks) => ranks.share_work(settings),
@@ -40,7 +40,7 @@ pub(super) fn share_work(settings: Settings) -> Settings {
     }
 }
 
-/// Adds the results of the other ranks to that of rank 0; they send theirs. Errors: of any rank.
+/// Combines the results of all ranks on rank 0; other ranks send theirs. Errors: those of any rank.
 pub(super) fn gather<T: Serialize + DeserializeOwned>(
     mine: Result<T, Failure>,
     add: impl Fn(&mut T, T),

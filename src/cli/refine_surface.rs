@@ -1,4 +1,4 @@
-//! `refine-surface`: the same surface in finer triangles.
+//! The command `refine-surface`: divides the triangles of a surface.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `report`: a page about a mesh, to be opened in a browser.
+//! The command `report`: a page about a mesh for a web browser.
 
 use serde_json::json;
 

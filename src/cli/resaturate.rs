@@ -1,4 +1,4 @@
-//! `resaturate`: sub-domains of a finished store made again.
+//! The command `resaturate`: meshes sub-domains of a finished store again.
 
 use std::path::PathBuf;
 
@@ -52,7 +52,7 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
     finish(args, &remeshed, &settings, console)
 }
 
-/// Refuses what makes no sense together, before anything is read.
+/// Refuses options that exclude each other, before anything is read.
 fn check(args: &ResaturateArgs) -> Result<(), Failure> {
     let usage = |message: &str, help: &str| Err(Failure::new(Code::Usage, message).help(help));
     let has_sizes = resaturate_sizes::are_given(args);
@@ -111,7 +111,7 @@ fn print_forecast(list: &[RemeshForecast], console: &Console) {
     }
 }
 
-/// Exports, and what changed.
+/// Exports the mesh and prints the changes.
 fn finish(
     args: &ResaturateArgs,
     remeshed: &Remeshed,

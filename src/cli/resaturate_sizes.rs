@@ -1,16 +1,16 @@
-//! Sizes for sub-domains that are meshed again, as typed.
+//! Sizes for sub-domains that are meshed again, as typed on the command line.
 
 use super::args::{ResaturateArgs, SizeArgs};
 use super::config;
 use super::failure::Failure;
 use tetdb_engine::api::{Code, Error, Remesh};
 
-/// True if any sizes are given.
+/// Returns whether any sizes are given.
 pub fn are_given(args: &ResaturateArgs) -> bool {
     args.refine_by.is_some() || args.sizes != SizeArgs::default()
 }
 
-/// Adds the sizes that are given. Errors: sizes without a meaning, or that do not go together.
+/// Adds the given sizes. Errors: sizes that make no sense or exclude each other.
 pub fn with_sizes(args: &ResaturateArgs, mut remesh: Remesh) -> Result<Remesh, Failure> {
     if args.sizes != SizeArgs::default() {
         let mut sizes = config::sizes_of(&args.sizes);
@@ -27,7 +27,7 @@ pub fn with_sizes(args: &ResaturateArgs, mut remesh: Remesh) -> Result<Remesh, F
     }
 }
 
-/// Refuses what makes no sense beside lengths one by one.
+/// Refuses options that exclude lengths given one by one.
 fn check_alone(args: &ResaturateArgs, file: &str) -> Result<(), Failure> {
     let others =
         SizeArgs { hmin: None, hmax: None, hgrad: None, size_field: None, ..args.sizes.clone() };

@@ -1,4 +1,4 @@
-//! `sample`: made surfaces as files.
+//! The command `sample`: writes generated surfaces to files.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -21,7 +21,7 @@ fn to_stdout(
     console: &Console,
 ) -> Result<u8, Failure> {
     let surface = Surface::load(&[word.to_owned()], settings)?;
-    // The writers write files alone, so there is one first, with the name of this process.
+    // The writers only write files, so a temporary file with the process id in its name comes first.
     let name = format!("tetdb-sample-{}.{format}", std::process::id());
     let file = settings.scratch_dir().join(name);
     let copied = surface.write(&file).map_err(Failure::from).and_then(|_| {
@@ -43,7 +43,7 @@ fn copy(file: &Path, console: &Console) -> std::io::Result<()> {
     }
 }
 
-/// The file for what is inside a surface in `file`.
+/// Path of the file for content inside a surface written to `file`.
 fn beside(file: &Path, what: &str, end: Option<&str>) -> PathBuf {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let own = file.extension().unwrap_or_default().to_string_lossy();

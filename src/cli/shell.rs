@@ -1,4 +1,4 @@
-//! `completions` and `man`: what shells and manual readers want to know of the command line.
+//! The commands `completions` and `man`: shell completions and manual pages.
 
 use std::path::Path;
 use tetdb_engine::api::Code;
@@ -37,12 +37,12 @@ pub fn man(args: &ManArgs, console: &Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// The commands that have a page of their own.
+/// The commands that have manual pages of their own.
 fn pages(root: &Command) -> impl Iterator<Item = &Command> {
     root.get_subcommands().filter(|c| c.get_name() != "help" && !c.is_hide_set())
 }
 
-/// `tetdb` or `tetdb-mesh`.
+/// Name of a page: `tetdb` or `tetdb-mesh`.
 fn name(command: &Command) -> String {
     let full = command.get_bin_name().unwrap_or(command.get_name());
     full.replace(' ', "-")
@@ -67,7 +67,7 @@ fn page(command: &Command) -> Result<Vec<u8>, Failure> {
     Ok(text)
 }
 
-/// The lines of examples in what stands below the options, and the rest of it.
+/// Splits the text below the options into the lines of examples and the rest.
 fn examples(after: &str) -> (Vec<&str>, String) {
     let is_head = |line: &str| matches!(line, "Example:" | "Examples:");
     let (mut examples, mut rest) = (Vec::new(), Vec::new());

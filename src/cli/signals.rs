@@ -1,4 +1,4 @@
-//! Ctrl-C, SIGTERM and SIGHUP end a run between two page accesses; a second one ends it at once.
+//! Signals: Ctrl-C, SIGTERM and SIGHUP end a run between two page accesses. A second signal ends it at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
@@ -10,28 +10,29 @@ use signal_hook::flag::register_conditional_shutdown;
 use signal_hook::iterator::Signals;
 
 static RECEIVED: AtomicI32 = AtomicI32::new(0);
-/// Whether there is a store that can be resumed.
+/// True if a store exists that can be resumed.
 static HAS_STORE: AtomicBool = AtomicBool::new(false);
-/// Whether what is under way must end in order: a step of a store, a file that is half written.
+/// True if the work in progress must end in order: a step of a store, or a half-written file.
 static IN_ORDER: AtomicBool = AtomicBool::new(false);
-/// What reads, validates and sizes a surface looks for signals here and there only; it has so long to end by itself.
+/// Time for a run to end by itself. Reading, validating and sizing a surface check for signals only now and then.
 const PATIENCE: Duration = Duration::from_millis(1000);
 
-/// From now on memory that the system refuses ends the process like any other lack of memory.
+/// Lets memory refused by the system end the process with the exit code for too little memory.
 ///
-/// Long arrays ask for memory in a way that can fail (`storage::reserve`). All the rest, libraries too, ends in the standard library, which says how
-/// many bytes were refused and aborts. Panics do not abort, so nothing else comes by here but a stack that is full.
+/// Long arrays request memory in a way that can fail (`storage::reserve`). All other requests, also in libraries, end in the standard
+/// library, which reports the number of bytes and aborts. Panics do not abort, so the only other cause is a full stack.
 pub fn end_without_memory() {
-    // Errors: the system knows no such signal; the process then ends by it.
+    // Errors: the signal is unknown to the system, and then ends the process.
     let _ = register_conditional_shutdown(SIGABRT, NO_MEMORY, Arc::new(AtomicBool::new(true)));
 }
 
-/// The exit code of too little memory.
+/// Exit code for too little memory.
 const NO_MEMORY: i32 = 6;
 
-/// Listens from now on, and cancels the run; where nothing would be left behind it ends soon after what `last` says, whose answer is the exit code.
+/// Listens for signals and cancels the run. If nothing would be left behind, the process then ends soon, with the exit code returned by
+/// `last`.
 ///
-/// Errors: the system refuses; the run then simply cannot be stopped gently.
+/// Errors: the system refuses; the run then cannot be cancelled by signals.
 pub fn listen(cancel: &CancelToken, last: impl Fn() -> u8 + Send + Sync + 'static) {
     let mut which = vec![SIGINT, SIGTERM];
     if !is_ignored(SIGHUP) {
@@ -58,7 +59,7 @@ pub fn listen(cancel: &CancelToken, last: impl Fn() -> u8 + Send + Sync + 'stati
     });
 }
 
-/// Whether the process was begun to ignore a signal, as `nohup` does with SIGHUP; also where the system does not say.
+/// Returns whether the process was started with a signal ignored, as by `nohup` for SIGHUP. Also true if the system does not report it.
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|l| l.strip_prefix("SigIgn:"));
@@ -66,23 +67,23 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_none_or(|mask| mask >> (signal - 1) & 1 != 0)
 }
 
-/// From now on there is a store: a step under way ends in order, however long that takes.
+/// Announces that a store exists. A step in progress then ends in order, however long it takes.
 pub fn store_begins() {
     HAS_STORE.store(true, Ordering::SeqCst);
     end_in_order();
 }
 
-/// From now on something is under way that would leave something behind.
+/// Announces that the work in progress would leave something behind if it ended at once.
 pub fn end_in_order() {
     IN_ORDER.store(true, Ordering::SeqCst);
 }
 
-/// Whether there is a store to go on with.
+/// Returns whether a store exists that can be resumed.
 pub fn has_store() -> bool {
     HAS_STORE.load(Ordering::SeqCst)
 }
 
-/// 128 + the signal that stopped the run.
+/// 128 plus the number of the signal that ended the run.
 pub fn exit_code() -> u8 {
     match RECEIVED.load(Ordering::Relaxed) {
         0 => 128 + SIGINT as u8,

@@ -1,4 +1,4 @@
-//! `snapshot`: a picture of a cut through the mesh, or of surfaces in space.
+//! The command `snapshot`: a picture of a cut through the mesh, or of surfaces in space.
 
 use super::args::SnapshotArgs;
 use super::console::Console;
@@ -7,7 +7,7 @@ use super::memory;
 use super::query_ask::{bad, condition, numbers};
 use tetdb_engine::api::{Code, ColorBy, Snapped, Snapshot, Store};
 
-/// Least and greatest side of a picture in pixels.
+/// Least and greatest width or height of a picture, in pixels.
 const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;
 
 pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
@@ -30,7 +30,7 @@ pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// What is asked for. Errors: options that have no meaning.
+/// The requested picture. Errors: options that make no sense.
 fn snapshot(args: &SnapshotArgs) -> Result<Snapshot, Failure> {
     let [width, height] = pixels(&args.size)?;
     let (mut snapshot, in_space) = subject(args)?;
@@ -72,7 +72,7 @@ fn snapshot(args: &SnapshotArgs) -> Result<Snapshot, Failure> {
     })
 }
 
-/// What is drawn, and whether it is in space.
+/// The subject of the picture, and true if it is in space.
 fn subject(args: &SnapshotArgs) -> Result<(Snapshot, bool), Failure> {
     if args.surface {
         return Ok((Snapshot::surface(), true));

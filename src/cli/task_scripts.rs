@@ -1,34 +1,35 @@
 //! Scripts that run the stages of a plan, one for each kind of scheduler.
 //!
-//! Each stage is an array of tasks, then a `gather`, which fails while any of them has no receipt. So a script that is run again goes on.
+//! Each stage is an array of tasks followed by a `gather`, which fails if any task has no receipt. A script that is run again therefore
+//! continues.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use tetdb_engine::api::{TaskStage, TaskStatus};
 
-/// Beside the cap: code and stacks.
+/// Memory of a task that does not count towards its cap: code and stacks.
 const MEMORY_BESIDE: u64 = 64 << 20;
 
-/// What a script is written from.
+/// Data for writing a script.
 pub(super) struct Script<'a> {
     pub store: PathBuf,
     pub program: PathBuf,
     pub memory_bytes: u64,
     pub threads: usize,
     pub scratch: Option<PathBuf>,
-    /// A mesh file to be written in pieces at the end.
+    /// A mesh file to write in pieces at the end.
     pub export: Option<PathBuf>,
     pub planned: &'a TaskStatus,
 }
 
 impl Script<'_> {
-    /// Stages that are not complete, with their numbers from 1.
+    /// Incomplete stages, with their numbers from 1.
     fn stages(&self) -> impl Iterator<Item = (usize, &TaskStage)> {
         (1..).zip(&self.planned.stages).skip(self.planned.stage)
     }
 
-    /// A task, whose number the shell or the scheduler puts in.
+    /// The command of a task. The shell or the scheduler inserts the number.
     fn work(&self, task: &str) -> String {
         let mut line = format!(
             "{} work {} --task {task} --memory {}MiB --threads {}",
@@ -43,7 +44,7 @@ impl Script<'_> {
         line
     }
 
-    /// The export of one share, where one is wanted, and how many there are.
+    /// The command for exporting one share, if an export is requested, and the number of shares.
     fn export(&self, share: &str) -> Option<(String, u32)> {
         let of = self.planned.tasks.min(self.planned.subdomains);
         let line = format!(
@@ -68,7 +69,8 @@ impl Script<'_> {
         )
     }
 
-    /// Arrays with dependencies: a gather runs whatever became of its array, and stops what follows if tasks are left.
+    /// A Slurm script: job arrays with dependencies. A gather runs even if its array failed, and stops the later stages if tasks are
+    /// left.
     pub fn slurm(&self) -> String {
         let mut text = self.head();
         let megabytes = (self.memory_bytes + MEMORY_BESIDE).div_ceil(1 << 20);
@@ -89,7 +91,7 @@ impl Script<'_> {
                 single_quoted(&self.command("gather")),
             );
             after = " --dependency=afterok:$g".to_owned();
-            // Tasks that are cancelled because a stage failed count as ended: nothing is there to be gathered.
+            // Tasks cancelled because a stage failed count as ended, although there is nothing to gather.
             and = ",afterok:$g";
         }
         let resume = format!("{} --memory {}MiB", self.command("resume"), self.memory_bytes >> 20);
@@ -109,7 +111,7 @@ impl Script<'_> {
         text
     }
 
-    /// Tasks that fail are begun three times; what is left then, gather says.
+    /// A GNU parallel script. Failed tasks are tried three times; the gather then reports what is left.
     pub fn parallel(&self) -> String {
         let mut text = self.head();
         text += "# PARALLEL_OPTIONS may hold more options of parallel, such as '--jobs 4' or '--sshloginfile hosts'.\n";
@@ -136,7 +138,7 @@ impl Script<'_> {
         text
     }
 
-    /// Flags in a folder of their own stand for what is done.
+    /// A Snakemake file. Flag files in a folder of their own mark finished work.
     pub fn snakemake(&self) -> String {
         let mut text = String::from("# Flags of what is done; the results are in the store.\n");
         let flags = self.store.with_extension("tasks");
@@ -186,7 +188,7 @@ impl Script<'_> {
         text
     }
 
-    /// What to run, for any other scheduler and for hands.
+    /// The list of commands, for other schedulers or for running by hand.
     pub fn list(&self) -> String {
         let mut text = String::new();
         for (number, stage) in self.stages() {
@@ -209,7 +211,7 @@ impl Script<'_> {
     }
 }
 
-/// A path as a shell takes it.
+/// A path quoted for the shell.
 fn quoted(path: &Path) -> String {
     let text = path.to_string_lossy();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:@%".contains(c);

@@ -1,4 +1,4 @@
-//! `plan`, `work` and `gather`.
+//! The commands `plan`, `work` and `gather`.
 
 use std::env;
 use std::path::PathBuf;
@@ -13,9 +13,9 @@ use super::task_scripts::Script;
 use super::{memory, threads};
 use tetdb_engine::api::{ExportOptions, TaskStage, TaskStatus, Tasks, task_ranges};
 
-/// Sub-domains a task of the last stage should have, so that tasks end at about the same time.
+/// Number of sub-domains per task in the last stage, so that tasks end at about the same time.
 const SUBDOMAINS_PER_TASK: u32 = 4;
-/// What a task holds at most where nothing is asked for.
+/// Default memory cap of a task.
 const MEMORY_PER_TASK: u64 = 4 << 30;
 
 pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
@@ -86,7 +86,7 @@ pub fn work(args: &WorkArgs, console: &Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// The folder that the scheduler or the system gives a job on this machine.
+/// The folder that the scheduler or the system provides for a job on this machine.
 pub(super) fn scratch_of_machine() -> Option<PathBuf> {
     let set = |name| env::var_os(name).filter(|dir| !dir.is_empty());
     let dir = set("SLURM_TMPDIR").or_else(|| set("TMPDIR"))?;
@@ -117,12 +117,12 @@ pub fn gather(args: &GatherArgs, console: &Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// The tasks of a store for `info`.
+/// The tasks of a store as a JSON object, for `info`.
 pub(super) fn object(status: &TaskStatus) -> Value {
     json!(status)
 }
 
-/// The same for people.
+/// Prints the tasks of a store for people.
 pub(super) fn print(status: &TaskStatus, console: &Console) {
     let TaskStatus { done, running, failed, waiting, stage, stages, .. } = status;
     let current = stages.get(*stage);

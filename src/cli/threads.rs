@@ -1,9 +1,9 @@
-//! Numbers of threads as typed.
+//! Numbers of threads as typed on the command line.
 
 use super::failure::Failure;
 use tetdb_engine::api::Code;
 
-/// The number of threads that is asked for. Errors: none at all.
+/// The requested number of threads. Errors: zero.
 pub(super) fn asked(option: Option<usize>) -> Result<Option<usize>, Failure> {
     if option == Some(0) {
         let message = "--threads 0 is no thread to work with";

@@ -1,4 +1,4 @@
-//! `verify`: is it a valid mesh of its surface?
+//! The command `verify`: checks that a mesh is a valid mesh of its surface.
 
 use serde_json::json;
 
@@ -39,7 +39,7 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// The cap, and who helps.
+/// Settings of a verification: the cap, and the other ranks if any.
 pub(super) fn settings(args: &VerifyArgs, console: &Console) -> Result<Settings, Failure> {
     let cap = memory::cap(args.read.memory.as_deref())?;
     #[cfg_attr(not(feature = "mpi"), allow(unused_mut))]

@@ -1,13 +1,13 @@
-//! Counts, lists and sizes in words.
+//! Counts, lists and sizes as text.
 
 use std::borrow::Cow;
 
 use tetdb_engine::api::short;
 
-/// Names listed for people.
+/// Largest number of names listed.
 const LISTED: usize = 12;
 
-/// `1 label`, `2 labels`.
+/// A count with its noun: `1 label`, `2 labels`.
 pub fn count(n: impl Into<u64>, what: &str) -> String {
     match n.into() {
         1 => format!("1 {what}"),
@@ -15,7 +15,7 @@ pub fn count(n: impl Into<u64>, what: &str) -> String {
     }
 }
 
-/// Names with commas between, of many the first.
+/// Names separated by commas; of many, only the first.
 pub fn listed<T: AsRef<str>>(names: &[T]) -> String {
     let shown: Vec<&str> = names.iter().take(LISTED).map(AsRef::as_ref).collect();
     let rest = match names.len().saturating_sub(LISTED) {
@@ -31,10 +31,10 @@ pub fn bounds([low, high]: [[f64; 3]; 2]) -> String {
     format!("({}) to ({})", corner(low), corner(high))
 }
 
-/// Letters of a message that are shown: more than the longest path has.
+/// Largest number of characters shown of a message; more than the longest path has.
 const TEXT_MAX: usize = 5000;
 
-/// The begin and the end of a text that is longer than anybody reads, which repeats what was typed.
+/// The beginning and the end of a text that is too long to read, such as one that repeats its input.
 pub fn shortened(text: &str) -> Cow<'_, str> {
     let n = text.chars().count();
     if n <= TEXT_MAX {

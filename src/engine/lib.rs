@@ -1,4 +1,4 @@
-//! The recipe that meshes a surface, and the front door that programs call.
+//! The pipeline that meshes a surface, and the public calls of the library.
 //!
 //! | module | subject |
 //! |---|---|
@@ -6,7 +6,7 @@
 //! | `pipeline` | the recipe, in resumable steps |
 //! | `view` | pictures, sections, the page |
 //!
-//! Programs use the crate `tetdb`, which re-exports [`api`]. No promise is made of `pipeline` and `view`.
+//! Programs use the crate `tetdb`, which re-exports [`api`]. `pipeline` and `view` may change without notice.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -16,7 +16,7 @@ pub mod pipeline;
 #[doc(hidden)]
 pub mod view;
 
-/// What the front door hands out of other crates: sub-domains and their records, hits of a query.
+/// Types of other crates that appear in the public calls: sub-domains and their records, hits of a query.
 pub mod data {
     pub use glam::DVec3;
     pub use tetdb_schema as schema;

@@ -1,14 +1,15 @@
-//! `check` says what is wrong, what would mend it, and mends it only when told to.
+//! `check` reports the defects of a surface and how to repair them, and repairs only on request.
 //!
-//! Why: a surface changed without a word is another surface. How: cubes with holes, cracks and repeated triangles are checked,
-//! repaired, checked again and meshed; the folder is compared before and after.
+//! Why: a surface that is changed silently is a different surface.
+//! How: cubes with holes, cracks and repeated triangles are checked, repaired, checked again and meshed. The folder is compared before
+//! and after.
 
 use super::json::NEEDLES;
 use super::odd_inputs::{Triangles, cube_at, off};
 use super::place::Place;
 use serde_json::json;
 
-/// A cube whose sides are moved by `step` more from one to the next.
+/// A cube whose sides are displaced, each by `step` more than the one before.
 fn cracked(step: f64) -> Triangles {
     let mut triangles = cube_at(0.0, 0.0, 0.0);
     for (t, corners) in triangles.iter_mut().enumerate() {
@@ -198,7 +199,7 @@ fn options_without_meaning_are_refused_before_anything_is_written() {
     }
 }
 
-/// Fields scripts rely on.
+/// The fields that scripts rely on are present.
 #[test]
 fn the_answer_has_its_fields() {
     let place = Place::new();

@@ -1,8 +1,8 @@
 //! A run may end at any moment and loses no more than its current step.
 //!
-//! Why: long runs meet power cuts, full disks and impatient people.
-//! How: the process is killed or asked to stop as soon as its store can be seen, and again later; `resume` must
-//! arrive at the mesh of an undisturbed run.
+//! Why: long runs meet power cuts, full disks and impatient users.
+//! How: the process is killed or signalled as soon as its store exists, and again later. `resume` must give the mesh of an undisturbed
+//! run.
 
 use std::io::Read;
 use std::process::{Child, Command};
@@ -12,7 +12,7 @@ use super::place::{Done, Place};
 
 const SAMPLE: &str = "sample:balls,count=12";
 
-/// Starts a run and waits until its catalog is there.
+/// Starts a run and waits until its catalog exists.
 fn started(place: &Place) -> Child {
     let child =
         place.command(&["mesh", SAMPLE, "-o", "a.tetdb", "--threads", "1", "--json"]).spawn();
@@ -38,7 +38,7 @@ fn a_killed_run_is_resumed_to_the_same_mesh() {
     for millis in [0, 100, 300, 900] {
         let mut child = started(&place);
         std::thread::sleep(Duration::from_millis(millis));
-        // Which step it was in does not matter: the same must hold for all.
+        // The step in progress does not matter; the same must hold for all steps.
         child.kill().expect("the child can be killed");
         child.wait().expect("the child can be waited for");
         if !is_finished(&place) {
@@ -113,7 +113,7 @@ fn a_stopped_run_says_so_and_can_be_resumed() {
             .expect("stderr was piped")
             .read_to_string(&mut stderr)
             .expect("stderr is UTF-8");
-        // A run that ended on its own before the signal came is no failure of stopping.
+        // A run may have finished before the signal arrived.
         if status.code() != Some(0) {
             assert_eq!(status.code(), Some(exit), "{stderr}");
             assert!(stderr.contains("\"stopped\"") && stderr.contains("resume"), "{stderr}");
@@ -124,7 +124,7 @@ fn a_stopped_run_says_so_and_can_be_resumed() {
     }
 }
 
-/// A store that is to be replaced stays until the new one is whole, and what an interrupted run left is taken up.
+/// A store to be replaced stays until the new one is complete, and an interrupted replacement is continued.
 #[test]
 fn a_killed_replacement_is_taken_up() {
     let place = Place::new();
@@ -136,7 +136,7 @@ fn a_killed_replacement_is_taken_up() {
             .command(&[&new[..], &["--threads", "1"]].concat())
             .spawn()
             .expect("the program starts");
-        // Until the coarse mesh is there, or the end.
+        // Waits until the coarse mesh exists, or the run has ended.
         while !place.path("a.tetdb.being-made/subdomain-00000-g1.redb").exists() {
             if child.try_wait().expect("the child can be asked").is_some() {
                 break;
@@ -154,14 +154,14 @@ fn a_killed_replacement_is_taken_up() {
         }
         std::fs::remove_dir_all(place.path("a.tetdb")).expect("the store can be removed");
     };
-    // `resume` goes on with what was begun.
+    // `resume` continues the begun replacement.
     place.run_line(old).succeeds();
     let first = place.digest("a.tetdb");
     begun(&place);
     assert_eq!(place.digest("a.tetdb"), first, "it is there until the end");
     place.run_line("resume a.tetdb").succeeds();
     whole(&place);
-    // So does the same command; another one begins anew.
+    // Repeating the same command does so too; a different command starts anew.
     place.run_line(old).succeeds();
     begun(&place);
     place.run(&new).succeeds();
@@ -171,7 +171,7 @@ fn a_killed_replacement_is_taken_up() {
     place.run_line(&format!("{old} --force --optimize none")).succeeds();
     assert_ne!(place.digest("a.tetdb"), expected);
     assert!(!place.path("a.tetdb.being-made").exists());
-    // Killed between two renames, and before the old one was gone.
+    // As if killed between two renames, and before the old store was removed.
     for (from, to) in [("whole.tetdb", "a.tetdb.being-made"), ("a.tetdb", "a.tetdb.being-replaced")]
     {
         std::fs::rename(place.path(from), place.path(to)).expect("names can be changed");
@@ -180,7 +180,8 @@ fn a_killed_replacement_is_taken_up() {
     whole(&place);
 }
 
-/// What happens to bear the name of a replacement and is no store is nobody's to remove; nor are copies a user keeps beside a store.
+/// A folder that has the name of a replacement but is no store is not removed. Copies that a user keeps next to a store are not removed
+/// either.
 #[test]
 fn a_replacement_removes_nothing_of_a_user() {
     let place = Place::new();

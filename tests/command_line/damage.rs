@@ -1,7 +1,7 @@
-//! A store that is not what was written is found out, never trusted.
+//! A damaged store is detected and never trusted.
 //!
 //! Why: disks and copies fail silently, and a mesh with a few wrong bits looks like a mesh.
-//! How: bytes of a sealed chunk, of a database file's head and of the format row are changed behind the program's back.
+//! How: bytes of a sealed chunk, of a database file's head and of the format row are changed on disk.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::place::Place;
 
-/// A finished store of a box, and the path of its one sub-domain.
+/// A finished store of a box, and the path of its only sub-domain's file.
 fn finished() -> (Place, std::path::PathBuf) {
     let place = Place::new();
     place.run_line("mesh sample:box,h=0.2 -o box.tetdb").succeeds();
@@ -26,7 +26,7 @@ fn finished() -> (Place, std::path::PathBuf) {
 fn a_changed_byte_in_any_chunk_is_found() {
     let (place, file) = finished();
     let good = fs::read(&file).expect("the file is readable");
-    // The magic of a sealed chunk stands behind its checksum.
+    // The magic of a sealed chunk follows its checksum.
     let chunks: Vec<usize> =
         (0..good.len() - 64).filter(|&i| good[i..].starts_with(b"TETC")).collect();
     assert!(chunks.len() >= 3, "tetrahedra, vertices and facets have chunks, found {chunks:?}");
@@ -72,7 +72,7 @@ fn a_damaged_or_missing_database_file_is_found() {
 #[test]
 fn another_format_version_is_refused() {
     const PAGES: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
-    // The format row: a checksum that knows the key, the magic, the version.
+    // The format row: a checksum seeded with the key, the magic, the version.
     const KEY: u64 = 64 << 56;
     let (place, _) = finished();
     let db =
@@ -109,14 +109,14 @@ fn another_format_version_is_refused() {
     }
 }
 
-/// Turns a bit in the payload of the `n`-th chunk of the file whose name begins so; returns the name.
+/// Flips a bit in the payload of the `n`-th chunk of the file whose name starts with `begins`. Returns the name.
 fn flip(place: &Place, begins: &str, generation: bool, n: usize) -> String {
     let mut names: Vec<String> = fs::read_dir(place.path("a.tetdb"))
         .expect("a store is a folder")
         .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
         .filter(|name| name.starts_with(begins))
         .collect();
-    // Of two generations the shorter name, then the lesser one, is the older.
+    // Of two generations, the older one has the shorter name, or the lesser of equal length.
     names.sort_by_key(|name| (name.len(), name.clone()));
     let name = match generation {
         true => names.first(),
@@ -150,7 +150,7 @@ fn damage_in_what_is_only_kept_is_found_and_all_of_it_listed() {
         }
     };
     refused("verify a.tetdb --json", &[&before, &leaf]);
-    // The mesh is not harmed, and what can be dropped can be.
+    // The mesh is intact, and the dispensable files can be dropped.
     assert_eq!(place.digest("a.tetdb"), digest);
     place.run_line("query a.tetdb --point 0.1,0.2,0.3").succeeds();
     refused("resaturate a.tetdb --subdomain 0 --json", &[&leaf]);
@@ -158,7 +158,7 @@ fn damage_in_what_is_only_kept_is_found_and_all_of_it_listed() {
     let part = flip(&place, "subdomain-00001", false, 2);
     refused("verify a.tetdb --json", &[&part, &leaf]);
     assert!(!place.run_line("verify a.tetdb --json").stderr().contains(&before));
-    // A coarse leaf that is sound makes its sub-domain again; the other one is past help.
+    // A sound coarse snapshot restores its sub-domain. The other sub-domain cannot be repaired.
     place.run_line("resaturate a.tetdb --repair --no-verify").succeeds();
     assert_eq!(place.digest("a.tetdb"), digest);
     refused("verify a.tetdb --json", &[&leaf]);

@@ -1,7 +1,7 @@
-//! Each error word is provoked, says where and what to do, and leaves nothing behind.
+//! Each error code can be provoked. Its message has a place and help, and the command leaves nothing behind.
 //!
-//! Why: a script can rely on a word only if the word really comes, with its exit code.
-//! How: one case per row of the table. Each runs twice, for programs and for people; the folder must be as it was.
+//! Why: a script can rely on a code only if the code really occurs, with its exit code.
+//! How: one case for each row of the table. Each runs twice, for programs and for people. The folder must be unchanged afterwards.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use tetdb::Code;
 
 use super::place::{Place, TETRA, TETRA_INWARD};
 
-/// Words with a test of their own, in the file named.
+/// Codes with a test of their own, in the file named.
 const ELSEWHERE: &[(&str, &str)] = &[
     ("damaged", "damage.rs"),
     ("store-format", "damage.rs"),
@@ -36,7 +36,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("wire-too-near", "wires.rs"),
 ];
 
-/// Words no test provokes, and why.
+/// Codes that no test provokes, and the reasons.
 const UNPROVOKED: &[(&str, &str)] = &[
     ("internal", "a case that provokes it is a bug to mend"),
     ("surface-too-large", "takes more than four billion triangles"),
@@ -49,12 +49,12 @@ const UNPROVOKED: &[(&str, &str)] = &[
 struct Case {
     word: &'static str,
     exit: i32,
-    /// Files that are there, by name and content.
+    /// Existing files, by name and content.
     files: &'static [(&'static str, &'static str)],
-    /// Commands that come before, and succeed.
+    /// Commands to run before, which must succeed.
     before: &'static [&'static str],
     line: &'static str,
-    /// What the message or the place must name.
+    /// Text that the message or the place must contain.
     names: &'static str,
 }
 
@@ -62,7 +62,7 @@ const fn case(word: &'static str, exit: i32, line: &'static str, names: &'static
     Case { word, exit, files: &[], before: &[], line, names }
 }
 
-/// A question to a store of one tetrahedron.
+/// A query to a store of one tetrahedron.
 const fn asked(word: &'static str, exit: i32, line: &'static str, names: &'static str) -> Case {
     Case { word, exit, files: &[("a.off", TETRA)], before: &["mesh a.off"], line, names }
 }
@@ -281,7 +281,7 @@ fn each_case_ends_with_its_word() {
     }
 }
 
-/// Options named in the commands of a help text exist.
+/// Options in the commands of a help text must exist.
 fn helps_can_be_pasted(place: &Place, help: &str) {
     for command in help.split('`').skip(1).step_by(2).filter(|c| c.starts_with("tetdb ")) {
         let mut words = command.split_whitespace().skip(1);
@@ -320,7 +320,7 @@ fn another_surfaces_mesh_is_invalid() {
     let done = place.run_line("verify a.tetdb --against sample:box,h=0.5");
     assert_eq!(done.exit(), Some(7), "{}", done.stderr());
     assert!(done.stderr().contains("error[invalid-mesh]: a.tetdb"), "{}", done.stderr());
-    // For programs this is an answer.
+    // For programs, this result is an answer and not an error.
     let done = place.run_line("verify a.tetdb --against sample:box,h=0.5 --json");
     let report = done.json();
     assert_eq!((done.exit(), &report["valid"]), (Some(7), &false.into()));

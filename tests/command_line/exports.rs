@@ -1,7 +1,7 @@
-//! Exports go where they are asked to go, in the format that is asked for, or nowhere.
+//! Exports go to the requested place in the requested format, or nowhere.
 //!
-//! Why: what a solver is fed decides what it computes; a mixture of two meshes looks like a mesh.
-//! How: a small sample in two parts. Other programs read the formats in `tests/exports.py` and `tests/solvers.py`.
+//! Why: a solver computes with whatever mesh it reads, and a mixture of two meshes looks like a mesh.
+//! How: a small sample in two sub-domains. Other programs read the formats in `tests/exports.py` and `tests/solvers.py`.
 
 use super::place::Place;
 

@@ -1,13 +1,14 @@
-//! A mesh kept as working pages is the same mesh to whoever reads it.
+//! A mesh kept as working pages is the same mesh to every reader.
 //!
-//! Why: `--seal none` saves the time of packing; it must not cost an answer, an id or a digest.
-//! How: one mesh kept in both forms; every command that reads must say the same of both, bytes aside, also after a part was made again.
+//! Why: `--seal none` saves the time of packing, and must not change an answer, an id or a digest.
+//! How: one mesh is kept in both forms. Every reading command must report the same for both, except for bytes, also after a sub-domain
+//! was meshed again.
 
 use serde_json::Value;
 
 use super::place::Place;
 
-/// What `info` says, without what a form may change.
+/// The answer of `info`, without values that depend on the form.
 fn info(place: &Place, store: &str) -> Value {
     let mut info = place.run_line(&format!("info {store} --json")).succeeds().json();
     for key in ["store", "bytes", "catalog_bytes", "previous_bytes", "options", "journal"] {
@@ -65,11 +66,11 @@ fn pages_and_chunks_are_one_mesh() {
         let line = format!("resaturate {store} --subdomain 1 --refine-by 0.8");
         place.run_line(&line).succeeds();
     }
-    // What is made again keeps its form.
+    // A sub-domain that is meshed again keeps its form.
     assert_eq!(state("packed.tetdb").as_deref(), Some("sealed"));
     assert_eq!(state("pages.tetdb").as_deref(), Some("optimized"));
     same(&place);
-    // Neither is another mesh to `mesh`.
+    // For `mesh`, neither is a different mesh.
     let again = "mesh sample:box,h=0.045 -o pages.tetdb --subdomains 2 --no-verify";
     place.run_line(again).succeeds();
 }
@@ -84,7 +85,7 @@ fn damage_in_a_page_is_named() {
         .find(|path| path.to_string_lossy().contains("subdomain-"))
         .expect("a sub-domain");
     let mut bytes = std::fs::read(&file).expect("a file");
-    // Pages of 64 KiB: this is in the middle of one that holds tetrahedra.
+    // Pages have 64 KiB; this position is in the middle of a page of tetrahedra.
     let magic = b"TETP\x01\x00\x01\x00";
     let header = bytes.windows(magic.len()).position(|w| w == magic).expect("a page of tetrahedra");
     bytes[header - 30_000] ^= 4;

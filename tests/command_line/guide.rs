@@ -1,9 +1,9 @@
-//! Every command of the README and of the guide runs, and answers what the page shows.
+//! Every command of the README and of the guide runs, and prints the output shown on the page.
 //!
 //! Why: a page whose commands fail teaches nothing.
-//! How: in each page's `console` blocks the lines after `$ ` are run one after the other, each by `bash -euo pipefail`, in one fresh
-//! folder per page, with the built program's folder first in PATH. A command ending in `# exits N` must end with that code, any other
-//! with 0. Lines below a command must occur in what it wrote, in this order; `...` in them stands for anything.
+//! How: the lines after `$ ` in each page's `console` blocks run one after the other, each by `bash -euo pipefail`. Each page has a
+//! fresh folder, and the built program's folder is first in PATH. A command ending in `# exits N` must end with that code, any other
+//! with 0. The lines below a command must occur in its output, in this order; `...` in them stands for any text.
 
 use std::collections::VecDeque;
 use std::fs::{self, File};
@@ -15,21 +15,21 @@ use tetdb::Code;
 const README: &str = include_str!("../../README.md");
 const ERRORS: &str = include_str!("../../src/guide/errors.md");
 
-/// What stands before a command in a checkout.
+/// Prefix of a command in a checkout.
 const CARGO_RUN: &str = "cargo run --release -- ";
-/// The command that runs this very test, and those that only build.
+/// The command that runs this very test, and commands that only build.
 const NOT_HERE: [&str; 2] = ["cargo test --profile quick --workspace", "cargo install --path ."];
 /// The README's first sample is smaller here; `.ci/run` runs it in full.
 const SMALLER: (&str, &str) = ("count=100", "count=3");
 
-/// A command of a page and what the page shows of its answer.
+/// A command of a page and the output shown below it.
 struct Step {
     command: String,
     exit: i32,
     shown: Vec<String>,
 }
 
-/// The commands of the `console` blocks, in order. A line that ends in `\` goes on in the next.
+/// The commands of the `console` blocks, in order. A line that ends in `\` continues in the next line.
 fn steps(page: &str) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::new();
     let (mut inside, mut goes_on) = (false, false);
@@ -101,7 +101,7 @@ impl Step {
     }
 }
 
-/// Whether `line` is `shown`, in which `...` stands for anything.
+/// Returns whether `line` matches `shown`, in which `...` stands for any text.
 fn is_like(line: &str, shown: &str) -> bool {
     let mut rest = line;
     let parts: Vec<&str> = shown.split("...").collect();
@@ -177,14 +177,14 @@ fn the_readme() {
     assert_eq!(steps(README)[1].command, NOT_HERE[0], "the second command runs the tests");
 }
 
-/// Two screens, at most.
+/// The README has at most two screens.
 #[test]
 fn the_readme_is_short() {
     assert!(README.lines().count() <= 100);
     assert!(README.lines().all(|line| line.chars().count() <= 200));
 }
 
-/// Lines a person can read in a terminal; tables, and what is to be copied, may be longer.
+/// Lines are short enough for a terminal. Tables and text to be copied may be longer.
 #[test]
 fn lines_are_short() {
     for (name, page) in CHAPTERS {

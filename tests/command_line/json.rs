@@ -1,7 +1,7 @@
-//! The guide's chapter on scripting names every key that is answered, and no other.
+//! The guide's chapter on scripting lists exactly the keys of the JSON answers.
 //!
 //! Why: scripts are written from that page.
-//! How: each section's commands are run; the keys of what they answer, over all runs of a section, must be those of its tables.
+//! How: the commands of each section run. The keys of their answers, over all runs of a section, must be those of its tables.
 
 use std::collections::BTreeSet;
 
@@ -10,10 +10,10 @@ use serde_json::Value;
 use super::place::Place;
 
 const PAGE: &str = include_str!("../../src/guide/scripting.md");
-/// Keys below these are of any name.
+/// Keys below these may have any name.
 const FREE: [&str; 4] = ["options", "subdomains[].sizes.options", "findings", "measures.chunks"];
 
-/// The commands of each section, in order. The surfaces are written before.
+/// The commands of each section, in order. The surfaces are written first.
 const RUNS: [(&str, &[&str]); 16] = [
     ("sample", &["sample box,h=0.045 -o box.stl", "sample sphere,h=0.2 -o sphere.stl"]),
     (
@@ -67,15 +67,15 @@ const RUNS: [(&str, &[&str]); 16] = [
     ),
 ];
 
-/// A square without its lid, with a repeated triangle and a vertex on an edge.
+/// An open surface with a repeated triangle and a vertex on an edge.
 const HOLES: &str = "OFF\n9 8 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n0.5 0.5 0.5\n0.5 0 0\n0.5 0 0\n\
     3 0 1 2\n3 0 2 3\n3 0 1 5\n3 0 1 5\n3 0 5 4\n3 0 1 7\n3 3 6 2\n3 2 5 0\n";
-/// Two tetrahedra that cross, and a triangle whose neighbor across has its edge in two.
+/// Two tetrahedra that cross, and a triangle with an edge that its neighbor has in two pieces.
 const CROSSING: &str = "OFF\n13 11 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0.1 0.1 0.1\n2 0.1 0.1\n0.1 2 0.1\n0.1 0.1 2\n\
     5 0 0\n7 0 0\n6 1 0\n6 0 0\n6 -1 0\n\
     3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n3 4 6 5\n3 4 5 7\n3 4 7 6\n3 5 6 7\n3 8 9 10\n3 11 8 12\n3 9 11 12\n";
 
-/// The keys of each section; of `info` also under other names.
+/// The documented keys of each section; those of `info` also under other names.
 fn documented(section: &str) -> BTreeSet<String> {
     let mut inside = false;
     let mut keys = BTreeSet::new();
@@ -93,7 +93,7 @@ fn documented(section: &str) -> BTreeSet<String> {
     keys
 }
 
-/// The keys of a value; those below [`FREE`] as one.
+/// Collects the keys of a value; the keys below [`FREE`] count as one.
 fn collect(value: &Value, key: &str, keys: &mut BTreeSet<String>) {
     match value {
         Value::Object(object) if FREE.contains(&key) => {
@@ -121,14 +121,14 @@ fn collect(value: &Value, key: &str, keys: &mut BTreeSet<String>) {
     }
 }
 
-/// A key whose parts are documented is documented: a null in place of an object or list has the key of neither.
+/// Removes keys from `found` that are documented only by their parts: a null in place of an object or list has no parts.
 fn settle(found: &mut BTreeSet<String>, named: &BTreeSet<String>) {
     found.retain(|key| {
         let parts = [format!("{key}."), format!("{key}[")];
         named.contains(key) || !named.iter().any(|t| parts.iter().any(|p| t.starts_with(p)))
     });
 }
-/// A cube with a corner twice, all but 1e-5 of an edge apart.
+/// A cube with one corner doubled, 1e-5 of an edge apart.
 pub const NEEDLES: &str = "OFF\n9 14 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n1e-5 0 1\n\
     3 0 2 1\n3 0 3 2\n3 4 8 6\n3 8 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 8\n3 0 8 4\n\
     3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n";
@@ -169,7 +169,7 @@ fn every_key_is_documented_and_no_other() {
         let value: Value = serde_json::from_str(line).expect("an object a line");
         collect(&value, "", &mut said);
     }
-    // A line of progress comes only of what lasts; its keys are those of a test of their own.
+    // Only long runs print a line of progress. Its keys have a test of their own.
     settle(&mut said, &talk);
     let unnamed: Vec<&String> = said.difference(&talk).collect();
     assert!(unnamed.is_empty(), "keys on stderr that the chapter does not name: {unnamed:?}");
@@ -188,7 +188,7 @@ fn same(section: &str, mut found: BTreeSet<String>) {
     );
 }
 
-/// No command with `--json` is left out.
+/// Every command with `--json` has a section.
 #[test]
 fn every_command_has_a_section() {
     let help = Place::new().run(&["--help"]).succeeds().stdout();

@@ -1,7 +1,8 @@
-//! Memory: what a command may hold, and what the system lets it hold.
+//! Memory limits: the cap of a command, and limits of the system.
 //!
-//! Why: a cap that one command does not know, or that holds but for a large surface, is none. How: each command is given caps that are too small, then
-//! runs under a limit of the system that is little above its cap; one that cannot have the memory it asks for ends with the exit code for it.
+//! Why: a cap is worthless if one command ignores it, or if it fails only for large surfaces.
+//! How: each command gets caps that are too small, and then runs under a limit of the system slightly above its cap. A command that
+//! cannot get its memory ends with the exit code for that.
 
 use super::place::Place;
 #[cfg(target_os = "linux")]
@@ -50,7 +51,7 @@ fn a_surface_that_does_not_fit_the_cap_is_refused_with_the_cap_that_would_do() {
         assert!(help.starts_with("give at least --memory "), "{line}: {help}");
         assert!(place.names().is_empty(), "{line}: {:?}", place.names());
     }
-    // What would be generated has no end known ahead: it is refused on the way.
+    // The size of the generated surface is not known in advance, so it is refused during the work.
     let line = "refine-surface sample:box,h=0.2 fine.off --hsiz 0.002 --memory 64MiB --json";
     let done = place.run_line(line);
     assert_eq!(done.exit(), Some(6), "{}", done.stderr());
@@ -58,7 +59,7 @@ fn a_surface_that_does_not_fit_the_cap_is_refused_with_the_cap_that_would_do() {
     assert!(place.names().is_empty(), "{:?}", place.names());
 }
 
-/// The program under a limit of data of so many MiB; `None` where limits cannot be set.
+/// Runs the program under a data limit in MiB; `None` if limits cannot be set.
 #[cfg(target_os = "linux")]
 fn limited(place: &Place, mebibytes: u64, line: &str) -> Option<Output> {
     let mut command = Command::new("prlimit");

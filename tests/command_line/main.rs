@@ -1,4 +1,4 @@
-//! The program as its users meet it: processes, files, exit codes.
+//! The program as its users see it: processes, files, exit codes.
 
 mod check;
 mod crash;

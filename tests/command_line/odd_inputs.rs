@@ -1,8 +1,8 @@
-//! Odd files are meshed, bad files are refused with their place.
+//! Unusual files are meshed; bad files are refused with a place.
 //!
-//! Why: surfaces come from many programs, and a file that is read wrongly makes a wrong mesh without a word.
-//! How: cubes are written in every odd way known; `mesh` must fill the right volume, or name the right line, byte or triangle
-//! and leave no store. What each reader does with each error is tested beside the readers; here the program is run.
+//! Why: surfaces come from many programs, and a file that is read wrongly silently gives a wrong mesh.
+//! How: cubes are written in every unusual way known. `mesh` must fill the right volume, or name the right line, byte or triangle and
+//! leave no store. The readers have unit tests for each error; here the program runs.
 
 use super::place::Place;
 
@@ -24,7 +24,7 @@ const CUBE: [[usize; 3]; 12] = [
     [1, 3, 7],
     [1, 7, 5],
 ];
-/// The same sides as quadrilaterals.
+/// The same sides as quadrilaterals, seen from outside.
 const SIDES: [[usize; 4]; 6] =
     [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 
@@ -36,18 +36,18 @@ fn cube(map: impl Fn(Point) -> Point) -> Triangles {
     CUBE.iter().map(|t| t.map(|i| map(corner(i)))).collect()
 }
 
-/// The unit cube moved.
+/// The unit cube, translated.
 pub fn cube_at(x: f64, y: f64, z: f64) -> Triangles {
     cube(|p| [p[0] + x, p[1] + y, p[2] + z])
 }
 
-/// Two surfaces as one.
+/// Joins two surfaces.
 fn both(mut a: Triangles, b: Triangles) -> Triangles {
     a.extend(b);
     a
 }
 
-/// OFF with three vertices for each triangle: what is welded is up to the reader.
+/// OFF with three vertices for each triangle; the reader must weld them.
 pub fn off(triangles: &[[Point; 3]]) -> String {
     let mut text = format!("OFF\n{} {} 0\n", 3 * triangles.len(), triangles.len());
     for [x, y, z] in triangles.iter().flatten() {
@@ -85,7 +85,7 @@ fn stl_binary(header: &[u8], triangles: &[[Point; 3]]) -> Vec<u8> {
     bytes
 }
 
-/// Vertices, then faces that count back from the last vertex.
+/// OBJ with faces that count back from the last vertex.
 fn obj_negative() -> String {
     let mut text: String =
         (0..8).map(|i| format!("v {}\n", corner(i).map(|x| x.to_string()).join(" "))).collect();
@@ -106,7 +106,7 @@ fn off_polygons() -> String {
     text
 }
 
-/// Big-endian, colors and normals between what counts, an element before the faces.
+/// PLY in big-endian, with colors and normals between the coordinates, and an element before the faces.
 fn ply_big_endian() -> Vec<u8> {
     let mut bytes = b"ply\nformat binary_big_endian 1.0\nobj_info odd\nelement vertex 8\nproperty uchar red\nproperty float x\n\
         property float nx\nproperty double y\nproperty float z\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n\
@@ -135,9 +135,9 @@ fn ply_big_endian() -> Vec<u8> {
 struct Good {
     name: &'static str,
     bytes: Vec<u8>,
-    /// Of all filled regions, in order of size.
+    /// Volumes of all filled regions, in order of size.
     volumes: Vec<f64>,
-    /// What a note must say.
+    /// Text that a note must contain.
     note: &'static str,
 }
 
@@ -145,7 +145,7 @@ fn good(name: &'static str, bytes: impl Into<Vec<u8>>) -> Good {
     Good { name, bytes: bytes.into(), volumes: vec![1.0], note: "" }
 }
 
-/// A file that must be meshed, with something to tell.
+/// A file that must be meshed, with a note.
 fn noted(name: &'static str, bytes: impl Into<Vec<u8>>, note: &'static str) -> Good {
     Good { note, ..good(name, bytes) }
 }
@@ -155,10 +155,10 @@ fn pair(name: &'static str, triangles: Triangles, note: &'static str) -> Good {
     Good { volumes: vec![1.0, 1.0], ..noted(name, off(&triangles), note) }
 }
 
-/// One cube of this edge length.
+/// A cube with this edge length.
 fn sized(name: &'static str, edge: f64, away: f64) -> Good {
     let map = |p: Point| p.map(|x| x * edge + away);
-    // What the rounded coordinates enclose.
+    // The volume that the rounded coordinates enclose.
     let edge = edge + away - away;
     Good { volumes: vec![edge * edge * edge], ..good(name, off(&cube(map))) }
 }
@@ -231,7 +231,7 @@ fn very_small_and_very_large_cubes_are_meshed() {
     }
 }
 
-/// A file that must be refused: content, word, what the place must be or begin with.
+/// Checks that a file is refused: content, code, and the place or its beginning.
 fn refused(name: &str, bytes: impl AsRef<[u8]>, word: &str, place_found: &str) {
     let place = Place::new();
     place.write(name, bytes);
@@ -242,7 +242,7 @@ fn refused(name: &str, bytes: impl AsRef<[u8]>, word: &str, place_found: &str) {
     let at = error["where"].as_str().unwrap_or_default();
     assert!(at.starts_with(place_found), "{name}: at {at:?}, expected {place_found:?}");
     assert_eq!(place.names(), names, "{name} left something behind");
-    // `check` finds the same.
+    // `check` reports the same.
     let done = place.run(&["check", name, "--json"]);
     let said = if done.stdout().is_empty() {
         done.error()["code"].clone()
@@ -291,7 +291,7 @@ fn surfaces_that_bound_nothing_are_refused_with_their_place() {
     let first = || cube_at(0.0, 0.0, 0.0);
     let repeated = both(first(), vec![first()[7]]);
     refused("twice.off", off(&repeated), "duplicate-triangle", "triangles 7 and 12 near (");
-    // One side's diagonal is divided on one side only.
+    // The diagonal of one side is divided in one of its two triangles only.
     let mut junction = first();
     let [a, b, c] = junction[0];
     let middle = [0, 1, 2].map(|i| (a[i] + c[i]) / 2.0);
@@ -301,7 +301,7 @@ fn surfaces_that_bound_nothing_are_refused_with_their_place() {
     for (name, second) in [
         ("crossing.off", cube_at(0.3, 0.4, 0.5)),
         ("overlap.off", cube_at(1.0, 0.25, 0.25)),
-        // The same corners on the shared side, the other diagonal.
+        // Both cubes have the same corners on the shared side, but different diagonals.
         ("unlike.off", cube(|p| [1.0 + p[0], 1.0 - p[1], p[2]])),
     ] {
         refused(name, off(&both(first(), second)), "self-intersection", "triangles ");

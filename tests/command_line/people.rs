@@ -1,11 +1,11 @@
-//! The program as a person meets it: what it says by itself, on the way and at the end.
+//! The output of the program for people: unprompted, during a run and at the end.
 //!
-//! Why: a summary that hides the box of a part, or a hint that leads nowhere, costs a person an hour.
-//! How: small parts are checked, meshed and asked for, and what is printed is read as a person would.
+//! Why: a summary that hides the box of a part, or a hint that leads nowhere, costs a user an hour.
+//! How: small parts are checked, meshed and queried, and the output is compared with what a person would look for.
 
 use super::place::{Place, TETRA};
 
-/// Everything a command printed.
+/// All output of a command.
 fn said(place: &Place, line: &str) -> String {
     let done = place.run_line(line).succeeds();
     done.stdout() + &done.stderr()
@@ -193,7 +193,7 @@ fn help_wraps_at_the_width_of_the_terminal() {
         let mut command = place.command(&["query", "--help"]);
         let done = command.env("COLUMNS", width.to_string()).output();
         let text = done.expect("it starts").stdout;
-        // Examples are lines to be copied.
+        // Examples are lines that can be copied.
         let options = String::from_utf8_lossy(&text).into_owned();
         let options = options.split("Examples:").next().unwrap_or_default().to_owned();
         let widest = options.lines().map(|line| line.chars().count()).max();
@@ -201,7 +201,7 @@ fn help_wraps_at_the_width_of_the_terminal() {
     }
 }
 
-/// `script` of util-linux gives a command a terminal.
+/// Errors are colored on a terminal that allows colors. `script` of util-linux gives a command a terminal.
 #[cfg(target_os = "linux")]
 #[test]
 fn errors_have_colors_on_a_terminal_that_may_have_them() {

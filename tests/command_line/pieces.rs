@@ -1,7 +1,7 @@
-//! Sub-domains leave the store one by one, with all that a parallel solver must know of their neighbors.
+//! Sub-domains are exported one by one, with everything that a parallel solver needs about their neighbors.
 //!
-//! Why: a mesh made in parts is used in parts; what two parts share must be the same in both files, or a solver is wrong without noticing.
-//! How: one sample in four parts, each part read back from its own file and compared with the others and with what the store says.
+//! Why: a mesh created in parts is used in parts. What two parts share must be equal in both files, or a solver is silently wrong.
+//! How: one sample in four sub-domains. Each part is read from its own file and compared with the others and with the store's record.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::place::Place;
 
-/// A MEDIT text file: vertices as they are written, triangles with their reference, number of tetrahedra.
+/// A MEDIT text file: vertices as text, triangles with their reference, number of tetrahedra.
 struct Piece {
     vertices: Vec<String>,
     triangles: Vec<([usize; 3], u32)>,
@@ -82,7 +82,7 @@ fn what_two_parts_share_is_the_same_in_both_files() {
         for (&a, &b) in numbers.iter().zip(&others) {
             assert_eq!(pieces[low].vertices[a], pieces[high].vertices[b]);
         }
-        // Points are text made from exact coordinates: equal text is the same vertex.
+        // Points are written from exact coordinates, so equal text means the same vertex.
         let here: HashSet<&String> = pieces[low].vertices.iter().collect();
         let both = pieces[high].vertices.iter().filter(|v| here.contains(v)).count();
         assert_eq!(both, numbers.len(), "{low} and {high} share vertices that are not listed");
@@ -119,7 +119,7 @@ fn some_parts_are_a_mesh_with_a_closed_boundary() {
         }
     }
     assert!(!edges.is_empty() && edges.values().all(|n| n % 2 == 0), "the boundary has a rim");
-    // It is a surface as good as any: its mesh is made like one.
+    // The boundary is a valid surface, which can be meshed.
     place.run_line("check two.mesh").succeeds();
     let nine = place.run_line("export three.tetdb nine.mesh --subdomain 9");
     assert_eq!(nine.exit(), Some(3));
@@ -183,7 +183,7 @@ fn shares_of_an_export_in_pieces_are_together_that_of_one_process() {
             place.run_line(&line).succeeds();
         };
         export("one", "");
-        // More shares than sub-domains: some are empty.
+        // With more shares than sub-domains, some shares are empty.
         for of in [2, 5] {
             let folder = format!("of-{of}");
             std::fs::create_dir_all(place.path(&folder)).expect("a folder");
@@ -200,7 +200,7 @@ fn shares_of_an_export_in_pieces_are_together_that_of_one_process() {
     }
 }
 
-/// Bytes of all files in a folder and those below, by their paths in it.
+/// Bytes of all files in a folder and its subfolders, by relative path.
 fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -238,7 +238,7 @@ fn pieces_are_the_same_whoever_writes_them() {
         }
         let words = format!("export four.tetdb all{i}/{out} --pieces");
         place.run_line(&words).succeeds();
-        // Four processes at once, none of which knows of the others.
+        // Four independent processes at once.
         let tasks: Vec<_> = (0..4)
             .map(|rank| {
                 let words = format!("export four.tetdb each{i}/{out} --pieces --subdomain {rank}");
@@ -257,7 +257,7 @@ fn pieces_are_the_same_whoever_writes_them() {
     }
 }
 
-/// All files in a folder and in those in it, by their paths there.
+/// All files in a folder and its direct subfolders, by relative path.
 fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(folder).expect("the folder is readable") {

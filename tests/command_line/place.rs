@@ -1,4 +1,4 @@
-//! A folder to run the program in, and small surfaces to give it.
+//! A folder for running the program, and small surfaces for its input.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -11,17 +11,17 @@ use tempfile::TempDir;
 /// A closed surface of four triangles.
 pub const TETRA: &str =
     "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
-/// The same, every triangle turned round.
+/// The same surface with all triangles reversed.
 pub const TETRA_INWARD: &str =
     "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 3 1\n3 1 3 2\n3 0 2 3\n";
 
-/// The program that is tested: the one built with the tests, or one that `TETDB_PROGRAM` names, such as that of an older commit, of which tests of what
-/// was mended since must fail.
+/// The tested program: the one built with the tests, or the one that `TETDB_PROGRAM` names. With the program of an older commit, tests
+/// of later fixes must fail.
 pub fn program() -> PathBuf {
     std::env::var_os("TETDB_PROGRAM").map_or(env!("CARGO_BIN_EXE_tetdb").into(), PathBuf::from)
 }
 
-/// A folder of its own for one test, gone afterwards.
+/// A folder for one test, removed afterwards.
 pub struct Place {
     dir: TempDir,
 }
@@ -39,7 +39,7 @@ impl Place {
         fs::write(self.path(name), content).expect("the temporary folder takes files");
     }
 
-    /// Names in the folder, one level deeper too.
+    /// Names of the files in the folder and in its direct subfolders.
     pub fn names(&self) -> BTreeSet<String> {
         let mut names = BTreeSet::new();
         for entry in fs::read_dir(self.dir.path()).expect("the folder is readable") {
@@ -54,7 +54,7 @@ impl Place {
         names
     }
 
-    /// The program with these words, to be run in the folder.
+    /// A command that runs the program with these arguments in the folder.
     pub fn command(&self, words: &[&str]) -> Command {
         let mut command = Command::new(program());
         command.args(words).current_dir(self.dir.path()).stdin(Stdio::null());
@@ -67,12 +67,13 @@ impl Place {
         Done { words: words.join(" "), output }
     }
 
-    /// Runs a line as a shell without special characters would.
+    /// Runs a line, split at spaces like a shell line without special characters.
     pub fn run_line(&self, line: &str) -> Done {
         self.run(&line.split_whitespace().collect::<Vec<_>>())
     }
 
-    /// `four.tetdb`, `sample` in four sub-domains, is the mesh of one thread in little memory, and valid when one of them is meshed again.
+    /// Checks `four.tetdb`, which is `sample` in four sub-domains. It must be the mesh of one thread with little memory, and valid after
+    /// one of its sub-domains is meshed again.
     pub fn check_four(&self, sample: &str) {
         let again =
             format!("mesh {sample} -o again.tetdb --subdomains 4 --threads 1 --memory 128MiB");
@@ -88,7 +89,7 @@ impl Place {
     }
 }
 
-/// A run that has ended.
+/// A finished run.
 pub struct Done {
     words: String,
     output: Output,
@@ -111,13 +112,13 @@ impl Done {
         String::from_utf8_lossy(&self.output.stderr).into_owned()
     }
 
-    /// Panics with all that was said unless the exit code is 0.
+    /// Panics with all output unless the exit code is 0.
     pub fn succeeds(self) -> Self {
         assert_eq!(self.exit(), Some(0), "tetdb {}\n{}", self.words, self.stderr());
         self
     }
 
-    /// stdout as one JSON object.
+    /// Parses stdout as one JSON object.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.stdout()).unwrap_or_else(|e| {
             panic!("tetdb {}: {e} in {}\n{}", self.words, self.stdout(), self.stderr())
@@ -129,7 +130,7 @@ impl Done {
         let stderr = self.stderr();
         let mut objects =
             stderr.lines().rev().filter_map(|line| serde_json::from_str::<Value>(line).ok());
-        // Only the last line of a failed run is an error.
+        // Only the last line of a failed run is the error.
         let error = objects.next().and_then(|mut object| object.get_mut("error").map(Value::take));
         error.unwrap_or_else(|| panic!("tetdb {}: no error object in {stderr:?}", self.words))
     }

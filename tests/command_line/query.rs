@@ -1,8 +1,8 @@
-//! A store can be asked, and every form of the answer says the same.
+//! A store answers queries, and every form of an answer has the same content.
 //!
-//! Why: a mesh nobody can ask for a place or a bad tetrahedron is only half kept; scripts read the answers.
-//! How: all tetrahedra of a small mesh as objects, recomputed here; then the same questions in other forms. That the right
-//! tetrahedra are found is proved against all of them in `tests/questions`.
+//! Why: a mesh is of little use if a place or a bad tetrahedron cannot be found in it, and scripts read the answers.
+//! How: all tetrahedra of a small mesh are read as objects and recomputed here. The same queries are then asked in other forms.
+//! `tests/questions` shows that the right tetrahedra are found.
 
 use std::io::Write;
 use std::process::Stdio;
@@ -28,7 +28,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// Equal up to the last bit, which the reader of objects used here may lose.
+/// Equal up to the last bit, which the JSON reader used here may lose.
 fn near(x: f64, value: &Value) -> bool {
     (x - number(value)).abs() <= 1e-15 * x.abs()
 }

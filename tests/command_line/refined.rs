@@ -1,6 +1,6 @@
-//! A surface that is divided to the wanted lengths before it is meshed.
+//! A surface is divided to the wanted lengths before it is meshed.
 //!
-//! Why: edges of the surface stay, so that `--hsiz` alone is not reached near long ones.
+//! Why: edges of the surface stay, so `--hsiz` alone cannot be reached near long ones.
 
 use super::place::Place;
 
@@ -15,7 +15,7 @@ fn hsiz_is_reached_in_one_command_and_a_run_goes_on_after_a_stop() {
     place.run_line("resume begun.tetdb").succeeds();
     assert_eq!(place.digest("whole.tetdb"), place.digest("begun.tetdb"));
 
-    // The triangles as they are would leave edges of 0.5 and more.
+    // The undivided triangles would leave edges of 0.5 and more.
     let line = "query whole.tetdb --order-by edge_max --desc --limit 1 --select edge_max --json";
     let answer = place.run_line(line).succeeds().stdout();
     let first = answer.lines().next().expect("a tetrahedron");

@@ -1,7 +1,7 @@
-//! More regions than 16 bits can number.
+//! A mesh with more regions than 16 bits can number.
 //!
-//! Why: region numbers that wrap would join materials silently.
-//! How: a grid of small tetrahedra apart from each other, each a region of its own, meshed and verified.
+//! Why: region numbers that wrap would silently join materials.
+//! How: a grid of small, separate tetrahedra, each a region of its own, is meshed and verified.
 
 use std::fmt::Write;
 

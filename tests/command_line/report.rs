@@ -1,13 +1,13 @@
-//! The page of a mesh tells what the other commands tell, and holds all it needs.
+//! The page of a mesh agrees with the other commands, and contains everything it needs.
 //!
-//! Why: a page that was sent to somebody is all that somebody has.
-//! How: the page's data is taken out of it and set beside `info`; what a browser makes of it is seen by `tests/report.py`.
+//! Why: the recipient of a page has nothing else.
+//! How: the data is extracted from the page and compared with `info`. `tests/report.py` checks the page in a browser.
 
 use serde_json::Value;
 
 use super::place::Place;
 
-/// The text of the script element with this id.
+/// Text of the script element with this id.
 fn script<'a>(page: &'a str, id: &str) -> &'a str {
     let start = format!("id=\"{id}\">");
     let rest = page.split(&start).nth(1).expect("the element");
@@ -57,14 +57,15 @@ fn a_page_tells_what_info_tells() {
         sum(&edges["bins"]) + sum(&edges["given_bins"]),
         edges["edges"].as_u64().expect("a number")
     );
-    // Each edge once: Euler's formula, for a ball's vertices, edges, faces and tetrahedra.
+    // Counts each edge once, by Euler's formula for the vertices, edges, faces and tetrahedra of a ball.
     let shared = info["interfaces"][0]["faces"].as_u64().expect("faces");
     let facets = data["counts"]["triangles"].as_u64().expect("a number");
     assert!(edges["of_about"] == edges["edges"] && shared > 0);
     let faces = 2 * tets + facets / 2;
     let cut_vertices = data["counts"]["vertices"].as_u64().expect("a number");
     let all = edges["edges"].as_u64().expect("a number");
-    // Vertices of the interface are counted in both sub-domains; it is a disk: V = F / 2 + 1 + half its rim.
+    // Vertices of the interface count in both sub-domains. The interface is a disk: V = F / 2 + 1 + half the length of its boundary
+    // loop.
     let vertices = all + tets + 1 - faces;
     assert!(vertices < cut_vertices && vertices > cut_vertices - shared);
     let median = edges["median"].as_f64().expect("a number");

@@ -1,8 +1,8 @@
-//! Sub-domains of a finished store can be made again, and nothing else changes.
+//! Sub-domains of a finished store can be meshed again, and nothing else changes.
 //!
-//! Why: whoever wants a finer place in a large mesh must not wait for all of it, nor lose what he has; whoever's disk lost a
-//! file must not mesh again.
-//! How: one small store in three parts for each case; digests, sizes of edges and qualities before and after.
+//! Why: refining one place of a large mesh must not require meshing all of it, nor lose the old mesh. A lost file must not require a new
+//! mesh either.
+//! How: one small store in three sub-domains for each case. Digests, edge lengths and qualities are compared before and after.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -26,7 +26,7 @@ fn info(place: &Place) -> Value {
     place.run_line("info a.tetdb --json").succeeds().json()
 }
 
-/// One word of each sub-domain.
+/// The value of a key for each sub-domain.
 fn each(info: &Value, key: &str) -> Vec<String> {
     let parts = info["subdomains"].as_array().expect("a list");
     parts.iter().map(|part| part[key].to_string()).collect()
@@ -42,7 +42,7 @@ fn refuses(done: &Done, code: &str, exit: i32) {
     assert!(error["help"].as_str().is_some_and(|help| !help.is_empty()));
 }
 
-/// Ranks whose digests differ.
+/// Ranks with different digests.
 fn changed(before: &Value, after: &Value) -> BTreeSet<usize> {
     assert_eq!(each(before, "interface_digest"), each(after, "interface_digest"));
     assert_eq!(before["interfaces"], after["interfaces"]);
@@ -102,10 +102,10 @@ fn half_the_size_changes_one_part_only_and_can_be_undone() {
         100.0 * bins[0] / bins.iter().sum::<f64>()
     };
     assert!((good(&after) - good(&before)).abs() < 0.5, "{} {}", good(&before), good(&after));
-    // Made again as it is now, with nothing said of sizes.
+    // Meshed again unchanged, without any sizes.
     place.run_line("resaturate a.tetdb --subdomain 1").succeeds();
     assert!(changed(&after, &info(&place)).is_empty());
-    // That was no change: the one before it is undone.
+    // That was no change, so the change before it is undone.
     place.run_line("resaturate a.tetdb --undo").succeeds();
     assert_eq!(info(&place)["digest"], before["digest"]);
     refuses(&place.run_line("resaturate a.tetdb --undo --json"), "nothing-to-undo", 8);
@@ -123,7 +123,8 @@ fn half_the_size_changes_one_part_only_and_can_be_undone() {
     refuses(&place.run_line("resaturate a.tetdb --undo --json"), "nothing-to-undo", 8);
 }
 
-/// The median length of edges in units of the lengths wanted at their ends, of those farther than twice that from all faces that stay.
+/// The median edge length, in units of the lengths wanted at the edge's ends. Only edges farther than twice that length from all fixed
+/// faces count.
 fn metric_median(place: &Place, rank: u32) -> f64 {
     let mut store = Catalog::open(place.path("a.tetdb")).expect("a finished store");
     let mut part = store.open_subdomain(rank, 16 << 20).expect("a sealed sub-domain");
@@ -178,7 +179,7 @@ fn only_what_a_size_reaches_is_changed() {
     let after = info(&place);
     assert_eq!(changed(&before, &after), ids.iter().copied().collect());
     assert!(after["tets"].as_u64() > before["tets"].as_u64());
-    // The same again: nothing would be another.
+    // Repeating the request changes nothing.
     let again = place.run_line(&format!("resaturate a.tetdb --changed {corner} --json"));
     assert_eq!(again.succeeds().json()["subdomains"], Value::Array(Vec::new()));
 }
@@ -202,7 +203,7 @@ fn lengths_of_the_first_run_hold_unless_new_ones_say_otherwise() {
         let line = format!("resaturate a.tetdb --subdomain 0 --no-verify {same}");
         place.run_line(&line).succeeds();
         assert_eq!(info(&place)["digest"], digest, "{same}");
-        // Nothing has changed, so there is nothing to bring back.
+        // Nothing has changed, so nothing can be undone.
         let undo = place.run_line("resaturate a.tetdb --undo --json");
         refuses(&undo, "nothing-to-undo", 8);
     }
@@ -210,12 +211,12 @@ fn lengths_of_the_first_run_hold_unless_new_ones_say_otherwise() {
     assert!(some > 1.0 && more > some, "{some} {more}");
     // Nine tenths of the vertices are free.
     assert!((0.7..1.1).contains(&(more * 0.6f64.powi(3))), "{more}");
-    // The first run's sphere is there beside the new one.
+    // The first run's sphere applies together with the new one.
     let beside = again("--size-sphere 0.8,0.8,0.8,0.05,0.02");
     assert!(beside > 1.01, "{beside}");
 }
 
-/// The file of a sub-domain that counts.
+/// The current file of a sub-domain.
 fn sealed(place: &Place, rank: u32) -> std::path::PathBuf {
     let start = format!("a.tetdb/subdomain-{rank:05}-");
     let name = place.names().into_iter().find(|n| n.starts_with(&start));
@@ -227,7 +228,7 @@ fn a_damaged_part_is_made_again_from_its_coarse_leaf() {
     let place = made();
     let before = info(&place);
     place.run_line("resaturate a.tetdb --repair").succeeds();
-    // A chunk, all of the file, no file.
+    // Damages a chunk, the whole file, or removes the file.
     for damage in 0..3 {
         let file = sealed(&place, 2);
         let mut bytes = std::fs::read(&file).expect("the file is readable");
@@ -250,7 +251,7 @@ fn a_damaged_part_is_made_again_from_its_coarse_leaf() {
         verifies(&place);
         assert_eq!(info(&place)["digest"], before["digest"]);
     }
-    // Of a sub-domain with sizes of its own, too.
+    // Repairs a sub-domain with sizes of its own, too.
     place.run_line("resaturate a.tetdb --subdomain 2 --refine-by 0.8").succeeds();
     place.run_line("resaturate a.tetdb --forget").succeeds();
     let finer = info(&place);
@@ -275,7 +276,7 @@ fn a_killed_change_leaves_old_or_new() {
         std::thread::sleep(Duration::from_millis(millis));
         child.kill().expect("the child can be killed");
         child.wait().expect("the child can be waited for");
-        // A killed writer's lock goes with it.
+        // The lock of a killed writer is released.
         let found = info(&place)["digest"].clone();
         assert!(found == before || found == after, "{found} after {millis} ms");
         verifies(&place);
@@ -319,14 +320,14 @@ fn what_cannot_be_made_again_is_told() {
     refuses(&line(file), "unexpected-text", 3);
     npy("(1, 2)", &[0.1, 0.2]);
     refuses(&line(file), "unexpected-text", 3);
-    // Without coarse leaves the mesh is the same, and final.
+    // Without coarse snapshots, the mesh is the same and final.
     let digest = place.digest("a.tetdb");
     place.run_line(&format!("{MESH} --drop-coarse --force")).succeeds();
     assert_eq!(place.digest("a.tetdb"), digest);
     assert_eq!(info(&place)["coarse_bytes"], 0);
     refuses(&line("--subdomain 1"), "no-coarse-leaf", 8);
     assert!(!place.names().iter().any(|name| name.contains("coarse-")));
-    // What is not finished is not made again.
+    // An unfinished store cannot be meshed again.
     let words = ["mesh", "sample:balls,count=12", "-o", "b.tetdb", "--threads", "1"];
     let mut child = place.command(&words).spawn().expect("the program starts");
     while !Path::new(&place.path("b.tetdb/catalog.redb")).exists() {

@@ -1,4 +1,4 @@
-//! The same input gives the same mesh, however much memory and however many threads there are.
+//! The same input gives the same mesh, for any amount of memory and any number of threads.
 //!
 //! Why: results that depend on the machine cannot be compared, resumed or trusted.
 //! How: one sample, several caps and thread counts, one digest.
@@ -22,7 +22,8 @@ fn caps_and_threads_do_not_change_the_mesh() {
     assert!(digests.iter().all(|d| *d == digests[0]), "{digests:?}");
 }
 
-/// What is mended is tried by all threads ahead of its turn: on these two, whatever is left over from one try shows in the next.
+/// All threads evaluate improvements of bad tetrahedra speculatively. On these two samples, state left over from one evaluation would
+/// change the next.
 #[test]
 fn threads_do_not_change_what_is_mended() {
     let place = Place::new();

@@ -1,20 +1,20 @@
-//! Regions are chosen and named by points inside them.
+//! Regions are selected and named by points inside them.
 //!
-//! Why: a region filled, left out or named by mistake is a wrong simulation, so what a seed says must arrive everywhere or be refused.
-//! How: three spheres in each other; seeds on the command line, in files of seeds, and in files of three formats.
+//! Why: a region filled, left out or named by mistake gives a wrong simulation. A seed must take effect everywhere or be refused.
+//! How: three nested spheres; seeds on the command line, in files of seeds, and in files of three formats.
 
 use super::place::Place;
 
 const SHELLS: &str = "sample:shells,count=3,h=0.3";
 
-/// The command ends with this error.
+/// Checks that the command ends with this error.
 fn refused(place: &Place, line: &str, code: &str) {
     let run = place.run_line(&format!("{line} --json"));
     assert_eq!(run.exit(), Some(3), "{line}");
     assert_eq!(run.error()["code"], code, "{line}");
 }
 
-/// Filled regions by number: name, and whether it is filled.
+/// For each region by number: its name, and whether it is filled.
 fn regions(place: &Place, store: &str) -> Vec<(Option<String>, bool)> {
     let info = place.run_line(&format!("info {store} --json")).succeeds();
     let info: serde_json::Value = serde_json::from_str(&info.stdout()).expect("an object");
@@ -121,7 +121,7 @@ fn holes_and_attributes_of_a_poly_choose_regions_where_seeds_do() {
     let expected = vec![named("attribute_7"), named("attribute_8")];
     assert_eq!(regions(&place, "full.tetdb"), expected);
     refused(&place, "mesh bad.poly --regions seeds", "bad-seed");
-    // Other rules fill what they fill; names come along where they fit.
+    // Other rules fill their regions; names apply where they fit.
     place.run_line("mesh bad.poly -o parity.tetdb").succeeds();
     let expected = vec![named("attribute_7"), (None, false)];
     assert_eq!(regions(&place, "parity.tetdb"), expected);

@@ -1,15 +1,15 @@
-//! Sheets inside a volume: faces with tetrahedra on both sides, through every step, or refused with the place.
+//! Sheets inside a volume become faces with tetrahedra on both sides in every step, or are refused with a place.
 //!
-//! Why: a fault that has a hole, or lies elsewhere than it was given, conducts what it should seal.
-//! How: a box with faults on a grid, from a sample and from files; sheets of few triangles that lie where they must not.
+//! Why: a fault that has a hole, or is not where it was given, conducts what it should seal.
+//! How: a box with faults on a grid, from a sample and from files; sheets of a few triangles in wrong places.
 
 use super::place::Place;
 
 const FAULTS: &str = "sample:faults,count=6,cells=4";
-/// Enough tetrahedra for four sub-domains.
+/// Large enough for four sub-domains.
 const MANY: &str = "sample:faults,count=6,cells=28";
 
-/// A box from 0 to 1 of twelve triangles, without the first `skipped`.
+/// A box from 0 to 1 with twelve triangles, without the first `skipped`.
 fn shell(skipped: usize) -> String {
     let points = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n";
     let faces = [
@@ -37,7 +37,7 @@ fn faults_are_faces_with_tetrahedra_on_both_sides_in_one_piece_and_in_several() 
         assert_eq!(verified.json()["triangles_missing"], 0, "{store}");
         let info = place.run_line(&format!("info {store}.tetdb --json")).succeeds().json();
         assert_eq!(info["subdomains"].as_array().map(Vec::len), Some(n));
-        // No fault parts a region.
+        // No fault separates regions.
         assert_eq!(info["regions"].as_array().map(Vec::len), Some(1));
         let line = format!("query {store}.tetdb --json --select id --touching-sheet");
         let found = place.run_line(&line).succeeds().stdout();
@@ -63,7 +63,7 @@ fn sheets_of_files_keep_their_names_and_give_the_mesh_of_the_sample() {
     let labels: Vec<&str> =
         labels.as_array().expect("a list").iter().filter_map(|l| l.as_str()).collect();
     assert!(labels[0] == "box" && labels.contains(&"faults:fault-1"), "{labels:?}");
-    // The finished mesh of this job is known again; the surface of the record is read with its sheets.
+    // The finished mesh of this job is recognized. The recorded surface is read again with its sheets.
     let same = "mesh box.obj --embed box_sheets.obj --name box_sheets.obj=faults -o files.tetdb";
     assert!(place.run_line(same).succeeds().stderr().contains("already holds"));
     place.run_line("verify files.tetdb --full").succeeds();
@@ -86,7 +86,7 @@ fn open_parts_of_a_surface_are_sheets_when_they_are_allowed() {
     place.run_line("verify all.tetdb --full").succeeds();
     let sheets = place.run_line("query all.tetdb --touching-sheet --json --select id");
     assert_eq!(sheets.succeeds().stdout().lines().count(), 4);
-    // Without its sides it is a sheet as a whole, in nothing.
+    // Without its sides, the whole surface is one sheet and encloses nothing.
     place.write("open.obj", shell(1));
     let run = place.run_line("mesh open.obj --allow-open --json");
     assert_eq!(run.error()["code"], "sheet-outside");

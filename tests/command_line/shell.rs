@@ -1,7 +1,7 @@
-//! Shells, manual readers and those who ask for help are served for every command.
+//! Completions, manual pages and help exist for every command.
 //!
-//! Why: a command that is not completed or has no example is a command people do not find.
-//! How: the list of commands is taken from the program's own help, and each must be in all of these.
+//! Why: users do not find a command without completion or example.
+//! How: the list of commands is taken from the program's own help. Each command must be in all of these.
 
 use super::place::Place;
 

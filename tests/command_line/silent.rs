@@ -1,7 +1,7 @@
-//! Nothing is lost in silence: inputs, answers, other runs' stores.
+//! Nothing is lost silently: inputs, answers, stores of other runs.
 //!
-//! Why: a tool that overwrites what it reads, or reports success with half an answer, is trusted once. How: each way of losing something that was
-//! found is tried, and must end with an error and everything where it was.
+//! Why: users lose their trust in a tool that overwrites its input, or reports success with half an answer.
+//! How: each known way of losing something is tried. It must end with an error, and everything must be unchanged.
 
 use std::fs::{self, File};
 use std::process::{Command, Stdio};
@@ -67,7 +67,7 @@ fn a_folder_is_no_file_to_be_written() {
         assert_eq!(done.error()["code"], "usage", "{command}");
         let holds = fs::read_dir(place.path(name)).expect("it stays").count();
         assert_eq!(holds, 0, "{command}");
-        // Before work begins.
+        // Refused before work begins.
         assert!(!place.path("other.tetdb").exists());
     }
 }

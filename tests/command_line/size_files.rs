@@ -1,7 +1,7 @@
 //! Sizes from a background mesh, or at the surface's own vertices.
 //!
-//! Why: solvers tell where they want small elements as numbers at vertices.
-//! How: small files written here; the mesh follows them, does not depend on how it is made, and each fault is named.
+//! Why: solvers report where they need small elements as numbers at vertices.
+//! How: small files are written here. The mesh must follow them, must not depend on how it is created, and each fault must be named.
 
 use super::place::Place;
 use serde_json::Value;
@@ -34,7 +34,7 @@ fn tets(answer: &Value) -> f64 {
 fn a_background_mesh_tells_sizes() {
     let place = Place::new();
     background(&place);
-    // At x = 0 one third of the way, at x = 1 two thirds.
+    // At x = 0 one third of the range, at x = 1 two thirds.
     sizes(&place, "0.01", "0.22");
     place.write("job.toml", "size_field = \"back.sol\"\n");
     let mut digests = Vec::new();
@@ -56,7 +56,7 @@ fn a_background_mesh_tells_sizes() {
     let line = "estimate sample:box,h=0.25 --size-field back.sol --json";
     let told = tets(&place.run_line(line).succeeds().json());
     assert!((told / made[0] - 1.0).abs() < 0.15, "{told} {made:?}");
-    // A file of the same name with other sizes is another job.
+    // A file with the same name and other sizes is a different job.
     sizes(&place, "0.02", "0.22");
     let done = place.run_line("mesh sample:box,h=0.25 --size-field back.sol -o a.tetdb --json");
     assert_eq!(done.error()["code"], "store-exists");
@@ -129,7 +129,7 @@ fn changed_sizes_are_noticed() {
     let line = "mesh sample:balls,count=60 --size-field back.sol -o k.tetdb --threads 1";
     let words: Vec<&str> = line.split_whitespace().collect();
     let mut child = place.command(&words).spawn().expect("the program starts");
-    // The coarse mesh takes a good while after the catalog is there.
+    // The coarse mesh is finished well after the catalog exists.
     while !place.path("k.tetdb/catalog.redb").exists() {
         std::thread::sleep(std::time::Duration::from_millis(2));
     }

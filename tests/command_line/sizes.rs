@@ -1,7 +1,7 @@
-//! Sizes asked for come out, and what a mesh takes is known before it is made.
+//! The mesh has the requested sizes, and its cost is predicted before the run.
 //!
-//! Why: who asks for sizes wants to see them in the mesh, and who has little room wants to know beforehand.
-//! How: estimates beside the meshes they tell of; each size option with values that make sense and values that make none.
+//! Why: users want to see the requested sizes in the mesh, and to know beforehand whether it fits.
+//! How: estimates are compared with the actual meshes. Each size option gets values that make sense and values that do not.
 
 use super::place::Place;
 use serde_json::Value;
@@ -11,7 +11,7 @@ fn number(value: &Value, name: &str) -> f64 {
     found.unwrap_or_else(|| panic!("no number {name} in {value}"))
 }
 
-/// A box with two tiny notches in a side of a few large triangles.
+/// A box with two tiny notches in a side with a few large triangles.
 const NOTCHES: &str = "OFF\n20 36 0\n-1 -1 -1\n-1 -1 1\n-1 1 -1\n-1 1 1\n-0.1525 0.497 1\n-0.0969 0.497 0.9852\n\
     -0.2082 0.5526 1\n-0.2082 0.6082 0.9852\n-0.1525 0.6082 1\n-0.0969 0.5526 1\n1 -1 -1\n\
     1 -1 1\n1 1 -1\n0.1791 0.089 1\n0.1774 0.0907 1\n0.1774 0.0924 0.9984\n0.1791 0.0924 1\n\
@@ -25,7 +25,7 @@ const NOTCHES: &str = "OFF\n20 36 0\n-1 -1 -1\n-1 -1 1\n-1 1 -1\n-1 1 1\n-0.1525
 fn beside_tiny_notches_lengths_stay_those_of_the_surface() {
     let place = Place::new();
     place.write("notches.off", NOTCHES);
-    // Lengths filled in between theirs once ran away below zero here, and 1e16 tetrahedra were expected.
+    // Interpolated lengths once fell below zero here, and 1e16 tetrahedra were predicted.
     let expected = place.run_line("estimate notches.off --json");
     let expected = number(&expected.succeeds().json(), "tets");
     place.run_line("mesh notches.off -o n.tetdb --quiet").succeeds();
@@ -84,7 +84,7 @@ fn the_look_ahead_can_be_left_out() {
     place.run_line(line).succeeds();
 }
 
-/// Tetrahedra of each region.
+/// Number of tetrahedra in each region.
 fn tets_of_regions(place: &Place, store: &str) -> Vec<f64> {
     let info = place.run(&["info", store, "--json"]).succeeds().json();
     let regions = info["regions"].as_array().expect("a list").clone();
@@ -107,7 +107,7 @@ fn regions_have_sizes_of_their_own() {
         place.run_line(&line).succeeds();
         found.push(tets_of_regions(&place, &format!("{store}.tetdb")));
     }
-    // The region asked for has its tetrahedra, others only those of the transition.
+    // The requested region gets its tetrahedra; other regions get only those of the transition.
     let [plain, first, second, named, both] = &found[..] else { panic!("{found:?}") };
     assert!(first[0] > 4.0 * plain[0] && first[2] < 3.0 * plain[2], "{found:?}");
     assert!(second[1] > 8.0 * plain[1] && second[1] > second[0], "{found:?}");

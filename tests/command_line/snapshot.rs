@@ -1,12 +1,12 @@
-//! Pictures are there, of the right size, and of the right things.
+//! Pictures exist, have the right size, and show the right elements.
 //!
-//! Why: a picture is believed at a glance; it must show the mesh that is there.
-//! How: the PNG's head and some of its pixels by way of a second picture; the SVG's polygons, counted and measured. That a section
-//! covers what the plane cuts, once, is shown in `tests/questions`.
+//! Why: people believe a picture at a glance, so it must show the actual mesh.
+//! How: the PNG's head and some of its pixels are checked, by way of a second picture. The SVG's polygons are counted and measured.
+//! `tests/questions` shows that a section covers the cut area exactly once.
 
 use super::place::Place;
 
-/// Corners of the polygons of an SVG file with their fill color, those of the bar of colors left out.
+/// Corners of the polygons of an SVG file with their fill color, without the color bar.
 fn polygons(text: &str) -> Vec<(Vec<[f64; 2]>, &str)> {
     let paths = text.lines().filter(|l| l.contains("stroke=\"#222\""));
     paths
@@ -42,7 +42,7 @@ fn a_cut_is_drawn_whole_and_in_its_colors() {
     let pieces = polygons(&svg);
     assert_eq!(answer["pieces"], pieces.len());
     assert_eq!(answer["bytes"], svg.len());
-    // The square with margins of 4 % on both sides, and room for the list of colors.
+    // The square has margins of 4 % on both sides, and space for the list of colors.
     let sum: f64 = pieces.iter().map(|(corners, _)| area(corners)).sum();
     assert!((sum / (422.5 * 422.5) - 1.0).abs() < 0.002, "{sum}");
     for color in pieces.iter().map(|(_, color)| *color) {
@@ -141,7 +141,7 @@ fn surfaces_are_drawn_with_what_bounds_them() {
     assert_eq!(pieces("--shell 1"), number("facets") + number("interface_faces"));
     let all = number("facets") + info["subdomains"][0]["facets"].as_u64().expect("a number");
     assert_eq!(pieces("--surface"), all);
-    // Half of the surface, and of the tetrahedra in the plane the faces that look to the viewer: one to three of each.
+    // Half of the surface, and for each tetrahedron in the plane one to three faces that point to the viewer.
     let plane = "0.5,0.5,0.5,1,0,0";
     let cut = place.run_line(&format!("query a.tetdb --plane {plane} --json"));
     let cut = cut.succeeds().stdout().lines().count() as u64;
@@ -169,7 +169,7 @@ fn a_surface_that_is_cut_open_shows_tetrahedra_and_labels_have_colors() {
     let n_cut = tets.succeeds().stdout().lines().count() as u64;
     assert!(n_cut > 0 && cut > n_cut && cut <= whole + 3 * n_cut, "{whole} {cut} {n_cut}");
     assert_eq!(pieces("--color label"), whole);
-    // What was cut has no label, and no color among those explained.
+    // Cut tetrahedra have no label, and none of the listed colors.
     let line = "snapshot box.tetdb a.svg --surface --plane 0.5,0.5,0.5,1,0,0 --color label";
     place.run_line(line).succeeds();
     let picture = std::fs::read_to_string(place.path("a.svg")).expect("a picture");

@@ -1,7 +1,7 @@
-//! Pipes, packed files, and inputs that have no end.
+//! Pipes, compressed files, and endless inputs.
 //!
-//! Why: a surface often comes out of another program, packed or not; and a device without end must not fill memory.
-//! How: surfaces go in by every way there is; endless and pathological inputs must be refused soon, with a place.
+//! Why: a surface often comes from another program, compressed or not. A device without end must not fill the memory.
+//! How: surfaces are passed in every supported way. Endless and pathological inputs must be refused soon, with a place.
 
 use std::io::Write;
 use std::process::Stdio;
@@ -119,7 +119,7 @@ fn lengths_that_no_mesh_can_have_are_refused_before_work_begins() {
     assert!(said.contains("expected a length"), "{said}");
 }
 
-/// A flat polygon of so many corners, or as many triangles on one edge.
+/// A flat polygon with `n` corners, or `n` triangles on one edge.
 fn around_a_circle(n: usize, is_polygon: bool) -> String {
     let corner = |k| {
         let (y, x) = (k as f64 / n as f64 * std::f64::consts::TAU).sin_cos();
@@ -139,7 +139,7 @@ fn around_a_circle(n: usize, is_polygon: bool) -> String {
     }
 }
 
-/// What the processor worked for `check` of a surface with defects; waiting for it does not count.
+/// Processor time of `check` on a surface with defects; waiting does not count.
 fn cpu_seconds_of_a_check(place: &Place, name: &str) -> f64 {
     let line = "TIMEFORMAT='%U %S'; { time \"$0\" check \"$1\" >/dev/null 2>&1; } 2>&1";
     let mut bash = std::process::Command::new("bash");
@@ -162,7 +162,7 @@ fn check_of_four_times_the_corners_or_triangles_takes_no_eight_times_as_long() {
         let seconds = [3_000, 12_000].map(|n| {
             let name = format!("{n}.off");
             place.write(&name, around_a_circle(n, is_polygon));
-            // On a busy machine even the least of some runs is longer.
+            // On a busy machine, even the least of some runs takes longer.
             let one = |_| cpu_seconds_of_a_check(&place, &name);
             (0..3).map(one).fold(f64::INFINITY, f64::min)
         });

@@ -1,7 +1,7 @@
-//! A mesh in several sub-domains is the same mesh, cut where nobody sees it.
+//! A mesh in several sub-domains is equally valid, and its cuts are not visible in it.
 //!
-//! Why: sub-domains are what lets a mesh outgrow memory; they must cost neither validity nor quality, nor depend on the machine.
-//! How: one sample in several numbers of sub-domains, verified, compared with the mesh in one piece, killed and resumed.
+//! Why: sub-domains allow a mesh to be larger than memory. They must not reduce validity or quality, nor depend on the machine.
+//! How: one sample in several numbers of sub-domains is verified, compared with the mesh in one piece, killed and resumed.
 
 use std::time::Duration;
 
@@ -47,7 +47,7 @@ fn any_number_of_parts_is_valid_and_of_the_same_size() {
     }
 }
 
-/// Who is a neighbor is told by both, with the same number of faces, which is that of the interfaces.
+/// Both neighbors list each other with the same number of faces, which is the number in the interfaces.
 fn topology_is_symmetric(info: &Value) {
     let parts = info["subdomains"].as_array().expect("a list");
     let shared = |a: &Value, b: &Value| {
@@ -85,7 +85,7 @@ fn cuts_are_good(info: &Value) {
             number(&found.unwrap_or_else(|| panic!("no {name}"))["value"])
         };
         assert!(measure("interface_faces") < 0.8 * measure("natural_faces"));
-        // Of one cut 1.159, and 1.157 of natural faces, whose vertices stand in their places.
+        // One cut has 1.159, and 1.157 for natural faces, whose vertices stay in place.
         assert!(measure("interface_face_quality") <= 1.003 * measure("natural_face_quality"));
         assert!(measure("over_constrained") <= 0.05 * measure("natural_over_constrained"));
         assert_eq!(measure("pinched"), 0.0);
@@ -120,7 +120,7 @@ fn threads_memory_and_interruptions_do_not_change_the_parts() {
             digests.push(place.digest("k.tetdb"));
             let names = place.names();
             let mut files = names.iter().filter(|n| n.starts_with("k.tetdb/"));
-            // The catalog; of each part the sealed mesh and the coarse leaf.
+            // The catalog, and for each sub-domain its sealed mesh and its coarse snapshot.
             assert_eq!(files.clone().count(), 7, "{:?}", files.next());
         }
         if place.path("k.tetdb").exists() {

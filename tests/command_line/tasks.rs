@@ -1,8 +1,8 @@
-//! A mesh by tasks is that of one process, whatever order they come in, how often, and where they are killed.
+//! A mesh by tasks is that of one process, in any order, with repetitions, and after kills at any point.
 //!
-//! Why: on a cluster tasks are requeued, run twice, lose their machine, and see each other's files late.
-//! How: real processes on one machine, each given only the store's path and its number; some are killed, some files are damaged, removed or
-//! shown late; then the digest is compared with that of one process.
+//! Why: on a cluster, tasks are requeued, run twice, lose their machine, and see each other's files late.
+//! How: real processes on one machine get only the store's path and their number. Some are killed; some files are damaged, removed or
+//! delayed. The digest is compared with that of one process.
 
 use std::collections::hash_map::RandomState;
 use std::fs;
@@ -16,7 +16,7 @@ use super::place::{Done, Place};
 const SAMPLE: &str = "sample:box,h=0.04";
 const SUBDOMAINS: &str = "4";
 
-/// Random numbers; the seed is printed, for a failure to be seen again.
+/// Random numbers. The seed is printed, so that a failure can be repeated.
 struct Random(u64);
 
 impl Random {
@@ -55,7 +55,7 @@ fn gather(place: &Place) -> Done {
     place.run_line("gather a.tetdb --wait 0 --json")
 }
 
-/// The tasks that can be done now; none when the store is finished.
+/// The tasks that can run now; none if the store is finished.
 fn next(place: &Place) -> Vec<u32> {
     let info = place.run_line("info a.tetdb --json").succeeds().json();
     let states = info["tasks"]["states"].as_array().cloned();
@@ -78,7 +78,7 @@ fn work(place: &Place, task: u32) {
     assert!(done.status.success(), "task {task}: {text}");
 }
 
-/// All that is left, one task after the other.
+/// Runs all remaining tasks, one after the other.
 fn work_off(place: &Place) {
     loop {
         next(place).into_iter().for_each(|task| work(place, task));
@@ -88,7 +88,7 @@ fn work_off(place: &Place) {
     }
 }
 
-/// Finished with this digest, and nothing in the folder that one process would not have left.
+/// The store is finished with this digest, and the folder has only the files that one process would leave.
 fn is_as_of_one_process(place: &Place, digest: &str) {
     assert_eq!(place.digest("a.tetdb"), digest);
     place.run_line("verify a.tetdb").succeeds();
@@ -120,7 +120,7 @@ fn tasks_in_any_order_and_each_twice_at_once_give_the_mesh_of_one_process() {
             let mut twice = [next(&place), next(&place)].concat();
             random.shuffle(&mut twice);
             for two in twice.chunks(2) {
-                // With a folder of the machine and without.
+                // With a local scratch folder and without.
                 let both =
                     [two.first().map(|t| (t, "--scratch local")), two.get(1).map(|t| (t, ""))];
                 let running = both.into_iter().flatten();
@@ -138,7 +138,7 @@ fn tasks_in_any_order_and_each_twice_at_once_give_the_mesh_of_one_process() {
         is_as_of_one_process(&place, &expected);
         let left = fs::read_dir(place.path("local")).expect("a folder").count();
         assert_eq!(left, 0, "tasks leave nothing on their machine");
-        // Whoever runs the same script again is not refused.
+        // Running the same script again is not refused.
         assert_eq!(gather(&place).succeeds().json()["finished"], true);
     }
 }
@@ -168,7 +168,7 @@ fn tasks_and_gathers_that_are_killed_anywhere_lose_nothing() {
             let child = place.command(&words).spawn().expect("the program starts");
             n_gathers_killed += kill(child, 40);
         }
-        // It may have come to the next stage before it was killed, whose tasks nobody has begun.
+        // The run may have reached the next stage before it was killed. No task of that stage has started then.
         let done = gather(&place);
         if done.exit() == Some(0) && done.json()["finished"] == true {
             break;
@@ -210,7 +210,7 @@ fn a_damaged_or_missing_receipt_is_a_task_to_do_again_and_is_named() {
     fs::write(&path, &bytes[..bytes.len() - 1]).expect("it can be cut");
     refused("its receipt cannot be used");
     work(&place, first);
-    // A receipt whose files are not there.
+    // A receipt whose files are missing.
     let files = fs::read_dir(place.path("a.tetdb/work")).expect("a folder");
     for entry in files.map(|e| e.expect("an entry")) {
         if entry.file_name().to_string_lossy().starts_with("files-") {
@@ -219,7 +219,7 @@ fn a_damaged_or_missing_receipt_is_a_task_to_do_again_and_is_named() {
     }
     let error = gather(&place).error();
     assert!(error["message"].as_str().is_some_and(|m| m.contains("missing")), "{error}");
-    // Orders that are damaged are refused by the task, and written anew.
+    // A task refuses damaged orders, and they are written again.
     let orders = place.path(&format!("a.tetdb/work/task-{first:05}.orders"));
     fs::write(&orders, b"nothing").expect("it can be damaged");
     let refused = place.run_line(&format!("work a.tetdb --task {first} --wait 0 --json"));
@@ -277,7 +277,7 @@ fn one_process_can_go_on_with_what_tasks_began_but_not_while_they_are_at_it() {
     gather(&place).succeeds();
     let first = next(&place)[0];
     work(&place, first);
-    // Somebody is at another task: this process, which lives.
+    // Another task is being performed, by this live process.
     let mark = place.path("a.tetdb/work/task-00003.mark");
     let host = fs::read_to_string("/proc/sys/kernel/hostname").expect("this test needs Linux");
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
@@ -296,7 +296,7 @@ fn one_process_can_go_on_with_what_tasks_began_but_not_while_they_are_at_it() {
     is_as_of_one_process(&place, &expected);
 }
 
-/// A scheduler that does at once what it is given, and knows arrays.
+/// A scheduler with job arrays that runs everything at once.
 const SBATCH: &str = r#"#!/bin/bash
 for word in "$@"; do
     case $word in --array=1-*) last=${word#--array=1-} ;; --dependency=*:) echo "empty dependency" >&2; exit 1 ;; esac

@@ -1,7 +1,8 @@
-//! Readers and the writer of a finished store leave each other alone.
+//! Readers and the writer of a finished store do not disturb each other.
 //!
-//! Why: a long export must not make a change fail, nor a change a question. How: the program changes a store while others read it; each answer
-//! must be of the mesh before or of the mesh after, and what is gone must be said to be gone, not damaged.
+//! Why: a long export must not block a change, nor a change a query.
+//! How: the program changes a store while others read it. Each answer must be of the mesh before or after the change. Removed data must
+//! be reported as removed, not as damaged.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -21,7 +22,7 @@ fn store(place: &Place) {
     place.run_line(line).succeeds();
 }
 
-/// The digest of all records that a reader finds.
+/// Digest of all records that a reader finds.
 fn found(reader: &mut Catalog) -> Result<String, StoreError> {
     let [told, _] = reader.digest()?;
     let [found, _] = audit::digest(reader, MEMORY)?;
@@ -29,7 +30,7 @@ fn found(reader: &mut Catalog) -> Result<String, StoreError> {
     Ok(found.to_string())
 }
 
-/// Every file of a folder with its bytes.
+/// All files of a folder with their bytes.
 fn content(dir: &Path) -> BTreeSet<(String, Vec<u8>)> {
     let entries = fs::read_dir(dir).expect("a folder");
     let content = entries.map(|entry| {
@@ -72,12 +73,12 @@ fn a_reader_keeps_to_the_state_it_began_with_and_hinders_no_writer() {
     let change = "resaturate a.tetdb --subdomain 1 --refine-by 0.8";
     place.run_line(change).succeeds();
     let after = place.digest("a.tetdb");
-    // What was replaced is kept as the previous version.
+    // The replaced files are kept as the previous version.
     assert_eq!(found(&mut reader).expect("its files are there"), before);
     assert!(!reader.is_current());
     let mut second = Catalog::open(&path).expect("a finished store");
     place.run_line("resaturate a.tetdb --subdomain 0 --refine-by 0.9 --no-verify").succeeds();
-    // Now the first version of sub-domain 1 is gone.
+    // Now the first version of sub-domain 1 is removed.
     let gone = found(&mut reader).expect_err("a file is gone");
     assert!(matches!(gone, StoreError::Changed { .. }) && !gone.is_damage());
     assert_eq!(tetdb::Error::from(gone).code(), "store-changed");
@@ -128,7 +129,7 @@ fn what_a_killed_writer_left_is_read_as_it_is_and_cleaned_up_by_the_next() {
     store(&place);
     let path = place.path("a.tetdb");
     let digest = place.digest("a.tetdb");
-    // As versions before this one left it: changed in place, and not closed.
+    // As earlier versions of the program left it: changed in place, and not closed.
     let mut file = StoreFile::open(path.join("catalog.redb"), 1 << 20, true).expect("a catalog");
     let key = u64::MAX - 1;
     file.write([(key, &[1][..])].into_iter()).expect("room");

@@ -1,17 +1,17 @@
-//! A wall between two solids keeps what each of them calls it.
+//! A wall between two solids keeps the labels of both.
 //!
-//! Why: a boundary condition goes by a label; one that is lost on a wall is lost without a word.
-//! How: two cubes side by side, each a file, the wall between them in both or in one.
+//! Why: boundary conditions refer to labels, and a label that is lost on a wall is lost silently.
+//! How: two adjacent cubes, each a file, with the wall between them in both files or in one.
 
 use std::fmt::Write;
 
 use super::place::Place;
 
-/// Sides as corners (bits x, y, z), seen from outside: the one at low x first, the one at high x next.
+/// Sides as corners (bits x, y, z), seen from outside: first the side at low x, then the one at high x.
 const SIDES: [[usize; 4]; 6] =
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
-/// A unit cube from `x` on as OBJ, without the first `skipped` sides.
+/// A unit cube starting at `x` as OBJ, without the first `skipped` sides.
 fn cube(x: f64, skipped: usize) -> String {
     let mut text = String::new();
     for c in 0..8 {
@@ -31,7 +31,7 @@ fn a_wall_in_two_files_keeps_both_labels() {
     place.write("left.obj", cube(0.0, 0));
     place.write("right.obj", cube(1.0, 0));
     place.run_line("mesh left.obj right.obj -o two.tetdb --hsiz 0.5").succeeds();
-    // All six sides of each cube are there under its own name, and nothing else is.
+    // All six sides of each cube have their own names, and nothing else is present.
     for (label, x) in [("left", [0.0, 1.0]), ("right", [1.0, 2.0])] {
         let line = format!("query two.tetdb --label {label} --json");
         let found = place.run_line(&line).succeeds().stdout();

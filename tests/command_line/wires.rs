@@ -1,14 +1,14 @@
-//! Edges and points inside a volume: whole and in their place through every step, or refused with the place.
+//! Edges and points inside a volume stay whole and in place through every step, or are refused with a place.
 //!
-//! Why: a well whose edges the mesher moved is in other rock, and a sensor that is no vertex measures nothing.
-//! How: a box with layers, wells and sensors, from a sample and from files of every kind; edges and points where they must not be.
+//! Why: a well whose edges were moved is in other rock, and a sensor that is no vertex measures nothing.
+//! How: a box with layers, wells and sensors, from a sample and from files of every kind; edges and points in wrong places.
 
 use super::place::Place;
 
-/// Enough tetrahedra for four sub-domains.
+/// Large enough for four sub-domains.
 const MANY: &str = "sample:wells,count=40,points=60,cells=22";
 
-/// A box from 0 to 1 of twelve triangles.
+/// A box from 0 to 1 with twelve triangles.
 const BOX: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 3 4\nf 1 4 2\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\nf 1 5 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n";
 
@@ -27,7 +27,7 @@ fn wells_and_sensors_are_edges_and_vertices_in_one_piece_and_in_several() {
         let info = place.run_line(&format!("info {store}.tetdb --json"));
         let info = info.succeeds().json();
         assert_eq!(info["subdomains"].as_array().map(Vec::len), Some(n));
-        // Those on faces between sub-domains once, and none that hold edges.
+        // Triangles on interfaces count once, and the support triangles of edges do not count.
         assert_eq!(info["input_triangles"], verified["triangles_present"]);
         assert_eq!(info["regions"].as_array().map(Vec::len), Some(1));
         let edges = info["wires"].as_array().expect("a list").iter();
@@ -38,7 +38,7 @@ fn wells_and_sensors_are_edges_and_vertices_in_one_piece_and_in_several() {
             place.run_line(&line).succeeds().stdout().lines().count()
         };
         assert!(found("well-1") > 10 && found("sensors") > 60 * 4);
-        // What holds the edges is no sheet.
+        // The support triangles of edges are no sheet.
         let sheets = place.run_line(&format!(
             "query {store}.tetdb --json --select id --touching-sheet --label well-1"
         ));
@@ -112,7 +112,7 @@ fn every_kind_of_file_gives_the_same_mesh() {
     );
     place.write("p.csv", "x,y,z,name\n0.7,0.25,0.5,north\n0.75, 0.7, 0.2\n");
     place.write("p.node", "2 3 0 1\n0 0.7 0.25 0.5 4\n1 0.75 0.7 0.2 0\n");
-    // What a head says of attributes may be anything: lines end where they end.
+    // The number of attributes in a head may be wrong; lines end at their line breaks.
     place.write("mad.node", "2 3 999999999991 1\n0 0.7 0.25 0.5 4\n1 0.75 0.7 0.2 0\n");
     place.write("p.txt", "# two\n0.7 0.25 0.5 north\n0.75\t0.7 0.2\n");
     let mut digests = Vec::new();
@@ -129,7 +129,7 @@ fn every_kind_of_file_gives_the_same_mesh() {
     let verified = place.run_line("verify s.tetdb --full --json").succeeds();
     let verified = verified.json();
     assert_eq!((&verified["edges_present"], &verified["points_present"]), (&2.into(), &2.into()));
-    // On an edge of the surface, on its corner and inside: nothing is added where a triangle has it.
+    // On an edge of the surface, on its corner and inside: nothing is added where a triangle has it already.
     place.write("on.obj", "v 0 0 0\nv 1 0 0\nv .5 .5 .5\nl 1 2\nl 2 3\np 1\n");
     place
         .run_line("mesh box.obj --embed-edges on.obj --embed-points on.obj -o on.tetdb")
@@ -145,7 +145,7 @@ fn points_and_ends_on_triangles_are_put_into_a_surface_that_may_be_divided() {
         "sheet.obj",
         "v .25 .25 .5\nv .75 .25 .5\nv .75 .75 .75\nv .25 .75 .75\nf 1 2 3\nf 1 3 4\n",
     );
-    // Inside triangles, on edges of two of them, on the sheet, and where nothing is.
+    // Inside triangles, on edges of two triangles, on the sheet, and in empty space.
     place.write(
         "on.csv",
         "0.5,0.25,0,a\n0.5,0,0,a\n0.75,0.125,0,b\n0.5,0.5,0.625,b\n.125,.125,.125,b\n",
@@ -170,7 +170,7 @@ fn points_and_ends_on_triangles_are_put_into_a_surface_that_may_be_divided() {
         place.run_line(&line).succeeds().stdout().lines().count()
     };
     assert!(found("sheet") > 20);
-    // Beside the bottom by less than can be meshed, which is as wide as long.
+    // Closer to the bottom, a square, than can be meshed.
     for (file, text, option) in [
         ("near.csv", "0.5,0.25,1e-17\n", "points"),
         ("near.obj", "v .5 .5 .5\nv .5 .25 1e-17\nl 1 2\n", "edges"),
@@ -257,7 +257,7 @@ fn edges_and_points_in_wrong_places_are_refused_with_the_place() {
         assert!(!error["where"].is_null(), "{file}: {error}");
         assert!(!place.path("s.tetdb").exists(), "{file}");
     }
-    // A point on an edge that is embedded, too, and beside a hole of the filled regions.
+    // A point on an embedded edge is refused, too. So is the repair of a surface with embedded edges.
     place.write("edge.obj", inside.to_owned() + "l 1 2\n");
     place.write("on.csv", "0.25,0.25,0.5\n");
     let run = place.run_line("mesh box.obj --embed-edges edge.obj --embed-points on.csv --json");

@@ -1,9 +1,9 @@
-//! What is frozen at interfaces stays when a sub-domain is made again.
+//! The frozen tetrahedra at interfaces stay when a sub-domain is meshed again.
 //!
-//! Why: a sub-domain is made again alone, so the tetrahedra that its neighbors' meshes were made to fit must not be touched.
-//! How: the tetrahedra of a coarse leaf that have a face on an interface, as sets of four positions, are looked for in the mesh before and after a change
-//! to half the size. Insertion may touch none of them. Optimization may exchange them for others on the same faces, in the first run
-//! as in the second, so that with it only the faces are asked for.
+//! Why: a sub-domain is meshed alone, so the tetrahedra that its neighbors were fitted to must not change.
+//! How: the tetrahedra of a coarse snapshot with a face on an interface are looked up in the mesh, before and after a change to half the
+//! size. They are compared as sets of four positions. Insertion may change none of them. Optimization may replace them by others on the
+//! same faces, in the first run as in the second; with it, only the faces are checked.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use tetdb_store::store::Catalog;
 use super::place::Place;
 
 type Position = [u64; 3];
-/// Positions of the corners, ascending.
+/// Positions of the corners, in ascending order.
 type Tet = [Position; 4];
 type Face = [Position; 3];
 
@@ -26,9 +26,9 @@ fn sorted<const N: usize>(mut corners: [Position; N]) -> [Position; N] {
     corners
 }
 
-/// The frozen tetrahedra of a coarse leaf, and its interface faces.
+/// The frozen tetrahedra of a coarse snapshot, and its interface faces.
 fn frozen(place: &Place, rank: u32) -> (BTreeSet<Tet>, BTreeSet<Face>) {
-    /// The flag of the attribute that says so.
+    /// Flag of frozen tetrahedra in the attribute.
     const FROZEN: u32 = 1;
     let mut store = Catalog::open(place.path("a.tetdb")).expect("a store");
     let mut leaf = store.open_coarse(rank, 1 << 20).expect("it was kept");
@@ -103,7 +103,7 @@ fn what_is_frozen_stays_whatever_the_sizes() {
         if optimize == "none" {
             assert!(frozen.is_subset(&before), "the first run touched frozen tetrahedra");
             assert!(frozen.is_subset(&after), "the change touched frozen tetrahedra");
-            // Each face has its own: they are those frozen.
+            // The tetrahedra at the interface are among the frozen ones.
             assert!(at_interface.is_subset(&frozen));
             assert_eq!(at_interface, at_interface_after);
         }

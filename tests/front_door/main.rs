@@ -1,7 +1,8 @@
-//! The library and the program are callers of one door.
+//! The library and the program use the same calls.
 //!
-//! Why: a store that one of them leaves must be whole to the other, and a program that embeds the library must outlive whatever becomes of
-//! a run. How: each makes, and the other verifies, resumes and changes; runs side by side are cancelled, refused and finished.
+//! Why: a store left by one of them must be complete for the other, and a program that embeds the library must survive any outcome of a
+//! run.
+//! How: each creates stores, which the other verifies, resumes and changes. Concurrent runs are cancelled, refused and finished.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -20,7 +21,7 @@ fn program(dir: &Path, words: &[&str]) -> std::io::Result<Output> {
     Command::new(env!("CARGO_BIN_EXE_tetdb")).args(words).current_dir(dir).output()
 }
 
-/// What the program prints; it must succeed.
+/// Output of the program, which must succeed.
 fn answer(dir: &Path, words: &[&str]) -> std::io::Result<String> {
     let output = program(dir, words)?;
     let talk = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -81,7 +82,7 @@ fn what_the_program_makes_the_library_goes_on_with() -> Outcome {
     let changed = theirs.remesh().subdomains(&[0]).scaled(0.7).run()?;
     assert!(changed.store.summary().n_tets > n);
     answer(dir.path(), &["verify", "box.tetdb"])?;
-    // The same job once more is the same store.
+    // Repeating the job returns the same store.
     let again = Mesher::new(Surface::sample("box,h=0.2")?)
         .sizes(Sizes::interior(Length::share_of_diagonal(0.1)))
         .create(dir.path().join("ours.tetdb"))?;
@@ -121,7 +122,7 @@ fn a_cancelled_run_goes_on_in_the_same_process_and_in_the_program() -> Outcome {
     Ok(())
 }
 
-/// Threads of this process, where the system says.
+/// Number of threads of this process, if the system reports it.
 fn n_threads() -> Option<usize> {
     Some(std::fs::read_dir("/proc/self/task").ok()?.count())
 }
@@ -168,7 +169,7 @@ fn a_run_leaves_no_thread_behind() -> Outcome {
         Ok(())
     };
     run("first.tetdb")?;
-    // Other tests of this process come and go: what is left over by a run would add up.
+    // Other tests of this process start and end threads. Threads left over by runs would add up.
     let mut least = usize::MAX;
     for i in 0..8 {
         run(&format!("{i}.tetdb"))?;
@@ -249,7 +250,7 @@ fn on_steps_needles_and_caps_what_the_surface_does_not_force_is_mended() -> Outc
         let other = mesher(2)?.create(at(format!("{name}{seed}_2.tetdb")))?;
         assert!(store.is_same_mesh(&other), "{spec} {seed}");
         assert!(store.summary().n_tets < 20_000, "{spec} {seed}");
-        // No volume that cannot be told from zero, unless a triangle forces it.
+        // No volume that is indistinguishable from zero, unless a triangle forces it.
         let flat = "volume < 1e-12*edge_max^3 and excess > 2";
         assert!(store.query().where_(flat)?.collect()?.is_empty(), "{spec} {seed}");
         let worst = store.query().order_by("excess", Order::Falling)?.limit(1);
@@ -257,14 +258,14 @@ fn on_steps_needles_and_caps_what_the_surface_does_not_force_is_mended() -> Outc
         assert!(
             worst.excess() >= 1.0 - 1e-9 && worst.excess() <= worst.shape.quality * (1.0 + 1e-9)
         );
-        // As good as allowed: the bound of what stands on the surface is met by its own quality.
+        // A poor tetrahedron that is nearly as good as allowed has a face on the surface.
         let forced = store.query().where_("quality > 3 and excess < 1.5")?.collect()?;
         assert!(forced.iter().all(|hit| hit.on_surface.is_some_and(|faces| faces.contains(&true))));
     }
     Ok(())
 }
 
-/// Whoever knows the format can write a page whose sums are right: what a run meets then is damage, never a bug of the program.
+/// A page can be changed so that its checksums are right. A run that reads it reports damage, never a bug of the program.
 #[test]
 fn pages_that_are_no_mesh_are_damage() -> Outcome {
     use redb::{Database, ReadableTable, TableDefinition};
@@ -284,7 +285,8 @@ fn pages_that_are_no_mesh_are_damage() -> Outcome {
     assert!(error.is_cancelled(), "{error}");
     let file = path.join("subdomain-00000-g1.redb");
     let good = std::fs::read(&file)?;
-    // The first node and the first neighbor of a tetrahedron, the first corner of a facet; numbers beyond the last page, and of others.
+    // The first node and the first neighbor of a tetrahedron, and the first corner of a facet. The numbers are beyond the last page, or
+    // belong to others.
     let beyond = [0x00ff_ff00, 0x0001_0000];
     for (kind, word, others) in [
         (PageKind::Tets, 0, [77, u32::MAX]),

@@ -1,7 +1,8 @@
-//! What was once fed to readers and decoders is fed to them again, with some changes.
+//! Inputs once found by fuzzing are fed to readers and decoders again, with some mutations.
 //!
-//! Why: whatever a file or a disk holds is answered with an error, never with a panic. How: `tools/fuzz` mutates its corpus
-//! for as long as one likes and keeps what was found; here every file of it runs, and a few mutations of each target.
+//! Why: any content of a file or disk is answered with an error, never with a panic.
+//! How: `tools/fuzz` mutates its corpus for as long as requested and keeps its finds. Here every file of the corpus runs, and a few
+//! mutations for each target.
 
 #[path = "../../tools/fuzz/src/file.rs"]
 mod file;

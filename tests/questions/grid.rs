@@ -1,4 +1,4 @@
-//! A store of cubes cut into six tetrahedra each, in slabs: coordinates are whole numbers, so that everything touches.
+//! A store of cubes cut into six tetrahedra each, in slabs. Coordinates are integers, so that many elements touch.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +17,7 @@ const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2,
 
 type GridPlace = [usize; 3];
 
-/// `cells` cubes along each axis, `parts` slabs along x, which must divide them.
+/// A grid of `cells` cubes along each axis, in `parts` slabs along x. `parts` must divide `cells`.
 pub(super) struct Grid {
     pub cells: usize,
     pub parts: usize,
@@ -62,7 +62,7 @@ impl Grid {
         self.cells / self.parts
     }
 
-    /// The planes x = multiple of a slab's width, within the grid, are the cuts 1, 2, ...
+    /// The planes x = multiple of a slab's width, inside the grid, are the cuts 1, 2, …
     fn cut_of(&self, x: usize) -> Option<u32> {
         (x.is_multiple_of(self.slab()) && x > 0 && x < self.cells).then(|| (x / self.slab()) as u32)
     }
@@ -121,7 +121,7 @@ impl Grid {
             .flat_map(move |x| (0..n).flat_map(move |y| (0..n).map(move |z| [x, y, z])))
     }
 
-    /// Faces on the sides are facets, faces on cuts are interface faces, numbered by their place.
+    /// Faces on the sides are facets. Faces on cuts are interface faces, numbered by position.
     fn faces(
         &self,
         writer: &mut SealedWriter,
@@ -162,7 +162,7 @@ impl Grid {
     }
 }
 
-/// From a cell's low corner to its high one along the axes in an order; two exchanged where the order is odd.
+/// Corners from a cell's low corner to its high one, along the axes in this order. Two are exchanged if the order is odd.
 fn corners(cell: GridPlace, order: [usize; 3], odd: bool) -> [GridPlace; 4] {
     let mut corners = [cell; 4];
     for i in 1..4 {

@@ -1,4 +1,4 @@
-//! Every kind of question against a test of all tetrahedra: on a grid, where everything touches, and on a real mesh.
+//! Every kind of question is compared with a test of all tetrahedra, on a grid with many touching elements and on a real mesh.
 
 mod grid;
 mod near;
@@ -22,7 +22,7 @@ use tetdb_store::store::Catalog;
 
 type Outcome<T = ()> = Result<T, Box<dyn std::error::Error>>;
 
-/// A store in a folder of its own.
+/// A store in its own folder.
 struct Fixture {
     dir: tempfile::TempDir,
 }
@@ -36,7 +36,7 @@ impl Fixture {
         Ok(QuerySession::open(Catalog::open(self.path())?, &Budget::new(cap))?)
     }
 
-    /// All tetrahedra, read without questions.
+    /// All tetrahedra, read without a query.
     fn all(&self) -> Outcome<Vec<Hit>> {
         let mut store = Catalog::open(self.path())?;
         let mut all = Vec::new();
@@ -49,7 +49,7 @@ impl Fixture {
                 let (ids, points) = (corners.map(|c| c.id), corners.map(|c| c.point));
                 let own = facets.iter().filter(|f| f.tets.contains(&id.local()));
                 let faces: Vec<[u32; 3]> = own.map(|facet| facet.vertices).collect();
-                // A face is opposite the vertex it lacks.
+                // A face is opposite the vertex that it lacks.
                 let on_surface = tet.nodes.map(|v| faces.iter().any(|face| !face.contains(&v)));
                 all.push(Hit {
                     on_surface: Some(on_surface),
@@ -100,7 +100,7 @@ impl Random {
         mix(self.0)
     }
 
-    /// From 0 to 1.
+    /// A number from 0 to 1.
     fn share(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -114,7 +114,7 @@ impl Random {
         bounds.low + (bounds.high - bounds.low) * share
     }
 
-    /// On a lattice of half cells of a grid, within it and a step beyond.
+    /// A point on the lattice of half cells of a grid, inside it or one step outside.
     fn lattice(&mut self, cells: usize) -> Point {
         let mut axis = || self.below(2 * cells + 3) as f64 / 2.0 - 0.5;
         Point::new(axis(), axis(), axis())
@@ -129,7 +129,7 @@ fn ids(found: impl IntoIterator<Item = Result<Hit, QueryError>>) -> Outcome<Vec<
     Ok(ids)
 }
 
-/// Compares the answers with a test of all tetrahedra; returns their number.
+/// Compares the answers with a test of all tetrahedra. Returns their number.
 fn expect(
     session: &mut QuerySession,
     all: &[Hit],

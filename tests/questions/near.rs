@@ -1,4 +1,4 @@
-//! Surface, interfaces, neighbors.
+//! Questions about the surface, interfaces and neighbors.
 
 use super::*;
 
@@ -18,7 +18,7 @@ fn surface_and_interfaces_select_what_stands_on_them() -> Outcome {
     let sides = |t: &Hit| faces(t, &|c| c.x == 0.0) || faces(t, &|c| c.z == end);
     let selection = Selection { labels: Some(vec![0, 5]), ..Selection::default() };
     let n = expect(&mut session, &all, selection.clone(), sides)?;
-    // In the cells along the edge one tetrahedron has both.
+    // In each cell along the edge, one tetrahedron has both.
     assert_eq!(n, 2 * 2 * cells * cells - cells);
     let cut = 4.0;
     let interface = |t: &Hit| faces(t, &|c| c.x == cut);

@@ -1,4 +1,4 @@
-//! The truth about solids in rational numbers, by other ways than those of the program: clipping, nearest points.
+//! Exact reference answers about solids in rational numbers, by other methods than the program's: clipping, nearest points.
 
 use dashu::rational::RBig;
 
@@ -34,7 +34,7 @@ fn volume(t: &[Vector; 4]) -> RBig {
     dot(&u, &cross(&v, &w))
 }
 
-/// Whether the closed tetrahedron holds the point.
+/// Returns whether the closed tetrahedron contains the point.
 pub(super) fn holds(corners: &[Point; 4], p: Point) -> bool {
     let (t, p) = (corners.map(exact), exact(p));
     (0..4).all(|i| {
@@ -66,7 +66,7 @@ fn from_triangle(p: &Vector, [a, b, c]: [&Vector; 3]) -> RBig {
     sides.into_iter().min().expect("three of them")
 }
 
-/// What is left of a convex polygon where `axis` times `sign` is at most `limit` times `sign`.
+/// The part of a convex polygon where `axis` times `sign` is at most `limit` times `sign`.
 fn clip(polygon: &[Vector], axis: usize, upper: bool, limit: &RBig) -> Vec<Vector> {
     let is_in = |p: &Vector| match upper {
         true => p[axis] <= *limit,
@@ -86,7 +86,7 @@ fn clip(polygon: &[Vector], axis: usize, upper: bool, limit: &RBig) -> Vec<Vecto
     left
 }
 
-/// Whether the closed tetrahedron meets the solid.
+/// Returns whether the closed tetrahedron meets the solid.
 pub(super) fn meets(solid: &Solid, corners: &[Point; 4]) -> bool {
     let t = corners.map(exact);
     let triangles = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
@@ -116,7 +116,7 @@ pub(super) fn meets(solid: &Solid, corners: &[Point; 4]) -> bool {
     }
 }
 
-/// Whether the tetrahedron lies in the solid.
+/// Returns whether the tetrahedron lies inside the solid.
 pub(super) fn within(solid: &Solid, corners: &[Point; 4]) -> bool {
     corners.iter().all(|&c| match *solid {
         Solid::Box(b) => (0..3).all(|i| b.low[i] <= c[i] && c[i] <= b.high[i]),

@@ -1,8 +1,8 @@
-//! Points and solids.
+//! Questions about points and solids.
 
 use super::*;
 
-/// The least id of those that hold the point, by exact signs of volumes in rational numbers.
+/// The lowest id among the tetrahedra that contain the point, by exact signs of volumes in rational numbers.
 fn holder(all: &[(Aabb, Hit)], p: Point) -> Option<TetId> {
     let near = all.iter().filter(|(b, _)| b.low.cmple(p).all() && p.cmple(b.high).all());
     let mut holding = near.filter(|(_, t)| oracle::holds(&t.corners, p));
@@ -35,7 +35,7 @@ fn points_are_found_in_the_lowest_tetrahedron_that_holds_them() -> Outcome {
             let again = corners.fold(Point::ZERO, |sum, (c, s)| sum + *c * s);
             assert!((again - p).length() < 1e-9 * found.edges()[1].max(p.length()));
         }
-        // One by one, from nothing: the other way to look.
+        // A few points at a time, each batch in a new session: the other way of searching.
         for batch in points.chunks(7).step_by(25) {
             let alone = fixture.session(64 << 20)?.locate(batch)?;
             let together = &located[points.iter().position(|p| p == &batch[0]).unwrap_or(0)..];
@@ -48,7 +48,7 @@ fn points_are_found_in_the_lowest_tetrahedron_that_holds_them() -> Outcome {
     Ok(())
 }
 
-/// Solids that touch grid tetrahedra in corners, edges and faces, and others.
+/// Solids that touch grid tetrahedra in corners, edges and faces, and other solids.
 fn solids(random: &mut Random, lattice: Option<usize>, bounds: &Aabb) -> Vec<Solid> {
     let point = |r: &mut Random| match lattice {
         Some(cells) => r.lattice(cells),
@@ -62,7 +62,7 @@ fn solids(random: &mut Random, lattice: Option<usize>, bounds: &Aabb) -> Vec<Sol
         let radius = match (lattice, i % 3) {
             (_, 0) => 0.0,
             (Some(_), 1) => random.below(5) as f64 / 2.0,
-            // Through the corner of a cell, but for rounding.
+            // Through the corner of a cell, up to rounding.
             _ => (a - b.round()).length() * 0.5,
         };
         solids.push(Solid::Sphere { center: a, radius });
@@ -86,7 +86,7 @@ fn solids_select_what_meets_them_and_what_lies_in_them() -> Outcome {
                 let found = ids(session.select(selection)?)?;
                 let found: BTreeSet<TetId> = found.into_iter().collect();
                 for (i, tet) in all.iter().enumerate() {
-                    // Rational numbers are slow: of the many far away only some are looked at.
+                    // Rational numbers are slow, so only some of the many distant tetrahedra are checked.
                     let far = solid.bounds().is_some_and(|b| !b.meets(&Aabb::around(tet.corners)));
                     if lattice.is_none() && i % if far { 997 } else { 41 } != 0 {
                         continue;

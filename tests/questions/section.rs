@@ -1,9 +1,9 @@
-//! Sections.
+//! Sections of the mesh by planes.
 
 use super::*;
 use tetdb_engine::view::{self, Piece, View};
 
-/// Twice the area of a piece, turned counter-clockwise or not.
+/// Twice the signed area of a piece.
 fn area(piece: &Piece) -> f64 {
     let corners = &piece.corners[..piece.n];
     let turned = corners.iter().zip(corners.iter().cycle().skip(1));
@@ -44,7 +44,7 @@ fn sections_cover_what_the_plane_cuts_once() -> Outcome {
         if expected == 0.0 {
             continue;
         }
-        // Faces of whole tetrahedra, seen from the front, hide no less.
+        // The front faces of whole tetrahedra cover at least the same area.
         let whole = section(&mut session, true)?;
         let pieces: Vec<Piece> = whole.collect::<Result<_, _>>()?;
         assert!(pieces.iter().all(|p| p.n == 3 && p.facing > 0.0 && area(p) > 0.0));

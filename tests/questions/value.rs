@@ -1,8 +1,8 @@
-//! Numbers, conditions, orders; how little is read.
+//! Questions with numbers, conditions and orders, and the number of chunks that they read.
 
 use super::*;
 
-/// Without what is read only where somebody asks for it.
+/// Hits without the values that are read only on request.
 fn bare(hits: &[Hit]) -> Vec<Hit> {
     let without = |hit: &Hit| Hit { on_surface: None, ..*hit };
     hits.iter().map(without).collect()
@@ -47,7 +47,7 @@ fn answers_are_sorted_by_any_variable() -> Outcome {
     let mut session = fixture.session(64 << 20)?;
     for (variable, descending) in [(4, false), (4, true), (0, true), (3, false)] {
         let dir = fixture.dir.path();
-        // Little memory: runs go to the disk.
+        // With little memory, sorted runs go to the disk.
         let ordered = Ordered::new(
             session.select(Selection::default())?,
             variable,

@@ -1,4 +1,4 @@
-//! The crate's sources as the tests of its structure read them.
+//! Reading the crates' sources, for tests of their structure.
 
 use std::fs;
 use std::path::{Path, PathBuf};

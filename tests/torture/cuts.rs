@@ -73,7 +73,7 @@ fn base(random: &mut Random) -> Shape {
     }
 }
 
-/// One change: what stays valid by construction is likely, what does not is left to the validator.
+/// Applies one change. Changes that keep the shape valid are likely; others are left to the validator.
 fn step(s: Shape, random: &mut Random) -> Shape {
     match random.below(7) {
         // Triangles get a point inside, in their plane or nearly.
@@ -81,16 +81,16 @@ fn step(s: Shape, random: &mut Random) -> Shape {
             let bulge = if random.one_in(2) { 0.0 } else { random.between(-1e-3, 1e-3) };
             divided_inside(s, bulge, random)
         }
-        // Edges are divided, both triangles with them.
+        // Edges are divided, together with both of their triangles.
         1 => divided_edges(s, random),
-        // Edges turn in their quadrilaterals.
+        // Edges are flipped in their quadrilaterals.
         2 => turned_edges(s, random),
-        // Everything is a little elsewhere.
+        // All points are moved a little.
         3 => {
             let by = 10f64.powf(random.between(-16.0, -1.5));
             s.mapped(|p| p + Point::new(1.0, 1.0, 1.0).map(|_| random.between(-by, by)))
         }
-        // Tilted and squeezed.
+        // The shape is tilted and squeezed.
         4 => {
             let (a, b) = (random.between(-1.0, 1.0), random.between(-1.0, 1.0));
             s.mapped(|p| Point::new(p.x + a * p.z, p.y + b * p.z, p.z))
@@ -103,7 +103,7 @@ fn step(s: Shape, random: &mut Random) -> Shape {
                 p
             })
         }
-        // Coordinates on a coarse lattice: new ties.
+        // Coordinates are moved to a coarse lattice, which creates new ties.
         _ => {
             let steps = f64::from(1u32 << random.below(20));
             s.mapped(|p| (p * steps).round() / steps)
@@ -128,7 +128,7 @@ fn divided_inside(mut s: Shape, bulge: f64, random: &mut Random) -> Shape {
     s
 }
 
-/// Edge to the triangles that have it.
+/// For each edge, the triangles that have it.
 fn edges(s: &Shape) -> Vec<([u32; 2], Vec<usize>)> {
     let mut edges: HashMap<[u32; 2], Vec<usize>> = HashMap::new();
     for (t, f) in s.triangles.iter().enumerate() {

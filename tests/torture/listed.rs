@@ -1,4 +1,4 @@
-//! The solids one by one, each as made, turned, scaled, moved far away and shuffled.
+//! The listed solids, each as constructed, rotated, scaled, moved far away and shuffled.
 
 use std::time::{Duration, Instant};
 
@@ -9,16 +9,16 @@ use super::random::Random;
 use super::shape::Shape;
 use super::solids::*;
 
-/// No case of these tests may take longer.
+/// Longest time for one case.
 const CASE_TIME_MAX: Duration = Duration::from_secs(30);
 
-/// Variants of each solid, times what `TETDB_TORTURE` says.
+/// Factor for the number of variants of each solid: the value of `TETDB_TORTURE`, or 1.
 fn variants() -> usize {
     let word = std::env::var("TETDB_TORTURE").unwrap_or_default();
     word.parse().unwrap_or(1)
 }
 
-/// Whether the outcome keeps the promise; a refusal does only where rounding may have made crossings.
+/// Checks that the outcome keeps the promise. A refusal is accepted only if rounding may have caused crossings.
 fn judge(shape: &Shape, outcome: &Outcome, took: Duration, may_refuse: bool) -> Result<(), String> {
     let what = match outcome {
         Outcome::Meshed { .. } => None,
@@ -37,7 +37,7 @@ fn judge(shape: &Shape, outcome: &Outcome, took: Duration, may_refuse: bool) -> 
     }
 }
 
-/// Meshes the solids as they are, through a store, and variants of them in memory.
+/// Meshes the solids unchanged, through a store, and variants of them in memory.
 fn torture(solids: Vec<Shape>) {
     let mut failures = Vec::new();
     let mut refused = [0, 0];
@@ -62,7 +62,7 @@ fn torture(solids: Vec<Shape>) {
         }
     }
     assert!(failures.is_empty(), "{} failures:\n{}", failures.len(), failures.join("\n"));
-    // Most variants are meshed, or the test would say little.
+    // Most variants must be meshed; otherwise the test would show little.
     assert!(refused[1] * 2 < refused[0], "{} of {} refused", refused[1], refused[0]);
 }
 
@@ -202,7 +202,7 @@ fn vertices_one_bit_apart() {
     for n in [1, 2, 4] {
         let cube = grid([n; 3], |x, y, _| (x * 7 + y).is_multiple_of(3)).mapped(|p| p + Point::ONE);
         solids.push(twins(n, &mut random));
-        // A plate as thin as doubles are, over a coordinate of one.
+        // A plate as thin as doubles allow, over a coordinate of one.
         let plate = cube.mapped(|p| {
             let z = if p.z == 1.0 { 1.0 } else { next_up(1.0) };
             Point::new(p.x, p.y, z)

@@ -1,4 +1,4 @@
-//! Many random cases, and what came of them.
+//! Many random cases, and counts of their outcomes.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
@@ -10,7 +10,7 @@ use super::mesher::{Outcome, recovery, whole};
 
 /// Cases of the smoke run.
 const SMOKE: u64 = 400;
-/// A case that takes longer is named at once: it may never end.
+/// A case that takes longer is printed at once, because it may never end.
 const SLOW: Duration = Duration::from_secs(20);
 
 /// Counts of a run.
@@ -60,7 +60,7 @@ impl Counts {
     }
 }
 
-/// Lists a case, and tells it at once: a run takes hours.
+/// Lists a case and prints it at once, because a run takes hours.
 fn told(list: &mut Vec<String>, name: &str, what: &str) {
     list.push(format!("{name}: {what}"));
     println!("{name}: {what}");
@@ -126,7 +126,7 @@ fn judge(counts: &Counts) {
         counts.slowest.0,
         counts.slowest.1,
     );
-    // Many that are too near would be an excuse.
+    // Too many cases refused as too near would hide failures.
     assert!((counts.too_near.len() as u64) * 1000 <= counts.meshed);
     assert!(counts.gave_up.is_empty() && counts.wrong.is_empty() && counts.panicked.is_empty());
 }
@@ -140,8 +140,8 @@ fn some_random_cuts_are_recovered() {
     judge(&run(1, 0, SMOKE, 2));
 }
 
-/// Nested shells where vertices that leave one after the other end up nearer to each other than doubles can say, unless
-/// they stay exact for a while.
+/// Nested shells in which vertices that leave one after the other end up nearer to each other than doubles can represent, unless they
+/// stay exact for a while.
 #[test]
 fn vertices_without_room_for_doubles_leave_the_surface() {
     judge(&run(5, 62_066, 1, 1));
@@ -169,7 +169,7 @@ fn random_cuts_by_the_hundred_thousand() {
     judge(&counts);
 }
 
-/// One case again, told in full; its surface is written where `TETDB_TORTURE_OFF` says.
+/// Repeats one case with full output. Its surface is written to the path in `TETDB_TORTURE_OFF`.
 #[test]
 #[ignore = "one case, for a look at it"]
 fn one_random_case() {

@@ -1,8 +1,7 @@
-//! A shape through the library, two ways, and what came of it.
+//! Meshes a shape through the library in one of two ways, and classifies the outcome.
 //!
-//! [`whole`] is what the command line does: a store on disk, all steps, and the audit against the surface. [`recovery`]
-//! goes as far as the colored coarse mesh, in memory, and checks that with a model of its own; it is what can be done a
-//! hundred thousand times.
+//! [`whole`] does the same as the command line: a store on disk, all steps, and the audit against the surface. [`recovery`] only creates
+//! the colored coarse mesh, in memory, and checks it with a model of its own. It is fast enough for a hundred thousand cases.
 
 use std::collections::HashMap;
 use std::time::Duration;
@@ -20,14 +19,14 @@ use tetdb_store::store::Catalog;
 
 use super::shape::Shape;
 
-/// What came of a shape.
+/// Outcome of meshing a shape.
 #[derive(Clone, Debug)]
 pub enum Outcome {
-    /// A mesh that passed its check, with so many tetrahedra.
+    /// A mesh that passed its check, with this number of tetrahedra.
     Meshed { tets: u64, recovery: Recovery },
     /// The validator refused it.
     Refused(String),
-    /// Recovery gave up where triangles are nearer to each other than [`NEAR`]: doubles may have no answer.
+    /// Recovery gave up where triangles are nearer to each other than [`NEAR`]. Doubles may have no solution there.
     TooNear(String),
     /// Recovery gave up elsewhere.
     GaveUp(String),
@@ -35,7 +34,7 @@ pub enum Outcome {
     Wrong(String),
 }
 
-/// The figures of recovery that are compared.
+/// The counts of recovery that are compared.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Recovery {
     pub missing: u32,
@@ -55,8 +54,8 @@ impl From<&RecoveryReport> for Recovery {
     }
 }
 
-/// Triangles nearer than this, in radians or shares of their size, may leave doubles no place between them: a few units of
-/// the last place of coordinates some ten times their size.
+/// Triangles nearer than this, in radians or relative to their size, may leave no double between them. The value is a few units in the
+/// last place of coordinates about ten times their size.
 const NEAR: f64 = 1e-13;
 
 fn given_up(error: &BoundaryError) -> Outcome {
@@ -68,7 +67,7 @@ fn given_up(error: &BoundaryError) -> Outcome {
     }
 }
 
-/// Welded, oriented, validated.
+/// Welds, orients and validates the shape.
 fn valid(shape: &Shape) -> Result<Surface, String> {
     let mut surface = shape.surface();
     orient_alike(&mut surface);
@@ -78,7 +77,7 @@ fn valid(shape: &Shape) -> Result<Surface, String> {
     }
 }
 
-/// All steps in a store, with the audit at full level against the surface.
+/// Runs all steps in a store, with the full audit against the surface.
 pub fn whole(shape: &Shape, optimize: &str) -> Outcome {
     let surface = match valid(shape) {
         Ok(surface) => surface,
@@ -88,7 +87,7 @@ pub fn whole(shape: &Shape, optimize: &str) -> Outcome {
     let path = dir.path().join("case.tetdb");
     let job = Job { options: String::new(), surfaces: Vec::new(), tool_version: String::new() };
     let mut catalog = Catalog::create(&path, &job).expect("an empty folder");
-    // Few tetrahedra: what is tested is the surface.
+    // Few tetrahedra, because the test is about the surface.
     let text = OptionsText {
         hsiz: Some("1000%".into()),
         hgrad: Some("10".into()),
@@ -137,7 +136,7 @@ pub fn recovery(shape: &Shape) -> Outcome {
     let report = match recover(&mut mesh) {
         Ok(report) => report,
         Err(error) => {
-            // What recovery leaves behind when it gives up is a valid mesh all the same.
+            // When recovery gives up, it must still leave a valid mesh.
             return match wrong(&mut mesh, None) {
                 None => given_up(&error),
                 Some(what) => Outcome::Wrong(format!("{what}, after: {error}")),
@@ -184,8 +183,10 @@ pub fn delaunay(surface: &Surface) -> Mesh<FlatPages> {
     mesh
 }
 
-/// What is wrong with a mesh: volumes not positive, neighbors not mutual, required faces other than the surface's
-/// triangles, open faces that are not required, vertices added on the surface. Without a surface, only the first two.
+/// The first defect of a mesh, if any.
+///
+/// Checks that volumes are positive and neighbors mutual. With a surface, also checks that required faces are its triangles, that open
+/// faces are required, and that no vertices were added on the surface.
 fn wrong(mesh: &mut Mesh<FlatPages>, surface: Option<&Surface>) -> Option<String> {
     let sorted = |mut f: [u32; 3]| {
         f.sort_unstable();

@@ -1,11 +1,11 @@
-//! Triangles of a polygon in the plane, ear by ear.
+//! Triangulation of a polygon in the plane by ear clipping.
 
 /// Twice the signed area of three points.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Triangles of a simple polygon, in its direction. Coordinates must be round enough for doubles to tell turns.
+/// Triangles of a simple polygon, in its direction. The signs of turns must be exact in doubles.
 pub fn triangulated(polygon: &[[f64; 2]]) -> Vec<[usize; 3]> {
     let n = polygon.len();
     let area: f64 = (1..n - 1).map(|i| turn(polygon[0], polygon[i], polygon[i + 1])).sum();

@@ -1,11 +1,11 @@
-//! A triangle soup with a name, and what can be done to it without changing what it is.
+//! A named triangle soup, and changes that keep it the same shape.
 
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{Surface, SurfaceBuilder};
 
 use super::random::Random;
 
-/// Points and triangles; triangles run counter-clockwise seen from outside where the maker takes care of it.
+/// Points and triangles. Triangles are counter-clockwise seen from outside if the constructor ensures it.
 #[derive(Clone, Debug, Default)]
 pub struct Shape {
     pub name: String,
@@ -18,7 +18,7 @@ impl Shape {
         Self { name: name.into(), ..Self::default() }
     }
 
-    /// Adds a point and returns its number.
+    /// Adds a point and returns its index.
     pub fn point(&mut self, x: f64, y: f64, z: f64) -> u32 {
         self.points.push(Point::new(x, y, z));
         self.points.len() as u32 - 1
@@ -44,7 +44,7 @@ impl Shape {
         self
     }
 
-    /// Adds another shape beside this one; equal points stay two until the surface is welded.
+    /// Adds another shape. Equal points stay separate until the surface is welded.
     pub fn with(mut self, other: &Self) -> Self {
         let base = self.points.len() as u32;
         self.points.extend(&other.points);
@@ -52,7 +52,7 @@ impl Shape {
         self
     }
 
-    /// Turned around an odd axis by an odd angle.
+    /// Rotates the shape at random.
     pub fn turned(self, random: &mut Random) -> Self {
         let q = rotation(random);
         let mut turned = self.mapped(|p| {
@@ -109,7 +109,7 @@ impl Shape {
         builder.finish()
     }
 
-    /// The shape as an OFF file, for a look at it.
+    /// The shape as an OFF file, for inspection.
     pub fn to_off(&self) -> String {
         let mut text = format!("OFF\n{} {} 0\n", self.points.len(), self.triangles.len());
         for p in &self.points {

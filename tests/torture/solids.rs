@@ -1,4 +1,4 @@
-//! Solids that are known to be hard, each for a reason told where it is made.
+//! Solids that are known to be hard, each for a reason given at its constructor.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -100,9 +100,9 @@ fn wall_of(s: &mut Shape, polygon: &[u32], axes: [usize; 2]) {
     }
 }
 
-/// The surface of a box of `n[0] * n[1] * n[2]` cells; `diagonal(x, y, face)` says how a square is cut.
+/// The surface of a box of `n[0] * n[1] * n[2]` cells; `diagonal(x, y, face)` selects the diagonal that cuts a square.
 ///
-/// A grid's points are cospherical by dozens, so that ties choose most of the diagonals, and choose them wrong.
+/// The points of a grid are cospherical by dozens, so most diagonals are chosen by ties, and most of these choices are wrong.
 pub fn grid(n: [u32; 3], mut diagonal: impl FnMut(u32, u32, usize) -> bool) -> Shape {
     let mut s = Shape::new(format!("grid {n:?}"));
     let mut ids: HashMap<[u32; 3], u32> = HashMap::new();
@@ -218,7 +218,7 @@ pub fn icosphere(levels: u32) -> Shape {
 
 /// `n` tetrahedra around one edge like the pages of a book, each `angle` thick, with gaps of `gap` between them.
 ///
-/// All share the edge, which then has 2n triangles; the angles are as small as they come.
+/// All share the edge, which therefore has 2n triangles. The angles may be arbitrarily small.
 pub fn book(n: u32, angle: f64, gap: f64) -> Shape {
     let mut s = Shape::new(format!("book of {n} pages of {angle:e} rad"));
     let (a, b) = (s.point(0.0, 0.0, 0.0), s.point(0.0, 0.0, 1.0));
@@ -250,7 +250,7 @@ pub fn wedge(n: u32, angle: f64, random: &mut Random) -> Shape {
     s
 }
 
-/// The cells of a pattern, row by row, pulled up: letters and plates with holes. `#` is a cell.
+/// The cells of a pattern, row by row, extruded: letters and plates with holes. `#` is a cell.
 pub fn extruded(rows: &[&str], depth: f64, random: &mut Random) -> Shape {
     let mut s = Shape::new(format!("letters {depth:e} deep"));
     let filled = |x: i64, y: i64| {
@@ -286,7 +286,7 @@ pub fn extruded(rows: &[&str], depth: f64, random: &mut Random) -> Shape {
     s
 }
 
-/// A polygon pulled up, its two ends cut into as few triangles as can be.
+/// An extruded polygon whose two ends have as few triangles as possible.
 pub fn pulled(name: &str, outline: &[[f64; 2]], depth: f64) -> Shape {
     let mut s = Shape::new(format!("{name} {depth:e} deep"));
     let n = outline.len() as u32;
@@ -310,7 +310,7 @@ pub fn next_up(x: f64) -> f64 {
     f64::from_bits(x.to_bits() + 1)
 }
 
-/// A grid on a cube, many triangles of which are divided at a point a few bits away from a corner.
+/// A grid on a cube with many triangles divided at a point a few bits away from a corner.
 pub fn twins(n: u32, random: &mut Random) -> Shape {
     let mut s = grid([n; 3], |x, y, _| (x + y).is_multiple_of(2));
     s.name = format!("cube of {n} with twin vertices");
@@ -321,7 +321,7 @@ pub fn twins(n: u32, random: &mut Random) -> Shape {
         if done[a as usize] || done[b as usize] || done[c as usize] || random.one_in(3) {
             continue;
         }
-        // A new corner beside `a`, inside the triangle: as near as doubles of this size allow.
+        // A new corner next to `a`, inside the triangle, as near as doubles of this size allow.
         let [p, q, r] = [a, b, c].map(|v| s.points[v as usize]);
         let step = (f64::from(n) + 1.0).log2().floor().exp2() * f64::EPSILON;
         let [x, y, z] = (p + ((q - p) * 2.0 + (r - p)) * step).to_array();

@@ -1,6 +1,6 @@
-//! Forms of columns: each writes one field of all records of a chunk, and reads it back.
+//! Forms of columns: each form writes one field of all records of a chunk, and reads it back.
 //!
-//! A record lists its fields with their forms in `columns!`, which makes both directions from the one list.
+//! The macro `columns!` takes the fields of a record with their forms, and generates both directions.
 
 use super::columns::{
     ColumnReader, ColumnWriter, Malformed, unzigzag32, unzigzag64, zigzag32, zigzag64,
@@ -20,7 +20,7 @@ pub(super) trait ColumnForm<V> {
     ) -> Result<(), Malformed>;
 }
 
-/// Both directions of a [`ChunkRecord`](super::ChunkRecord): its fields, or places of them, with their forms.
+/// Generates both directions of a [`ChunkRecord`](super::ChunkRecord) from its fields, or positions in them, with their forms.
 macro_rules! columns {
     ($($field:ident $([$place:literal])?: $form:ty,)+) => {
         fn encode(records: &[Self], first: u32, columns: &mut ColumnWriter) {
@@ -46,7 +46,7 @@ pub(super) use columns;
 /// An integer of a dictionary.
 pub(super) trait DictionaryWord: Copy {
     fn to_u64(self) -> u64;
-    /// High bits that the type lacks are dropped.
+    /// Drops high bits that the type lacks.
     fn from_u64(word: u64) -> Self;
 }
 
@@ -177,7 +177,7 @@ impl ColumnForm<f32> for DifferencePlanes {
     }
 }
 
-/// Coordinates, an axis after the other, as planes of differences: the high bytes of neighbors agree, the low ones are noise.
+/// Coordinates as planes of differences, one axis after the other. The high bytes of neighbors agree; the low ones are noise.
 pub(super) struct Points;
 
 impl ColumnForm<[f64; 3]> for Points {
@@ -213,7 +213,7 @@ impl ColumnForm<[f64; 3]> for Points {
     }
 }
 
-/// Three vertices: the first as a difference to the face before, the others to the first.
+/// Three vertices: the first as a difference to that of the previous face, the others as differences to the first.
 pub(super) struct FaceVertices;
 
 impl ColumnForm<[u32; 3]> for FaceVertices {
@@ -288,11 +288,11 @@ impl ColumnForm<u32> for TetOrNone {
 
 /// Numbers of vertices: the owner as a dictionary, the index as a difference to a guess.
 ///
-/// The guess is as far from the place of the vertex as the index of that owner's last vertex was. It is always right for the
-/// vertices of the sub-domain itself, whose index is their place.
+/// The guess takes the difference between index and position from the last vertex with the same owner. It is always right for the
+/// vertices of the sub-domain itself, whose index is their position.
 pub(super) struct VertexNumbers;
 
-/// Index less place at the last vertex of each owner; owners share 16 memories.
+/// Index minus position of the last vertex of each owner. Owners share 16 entries.
 #[derive(Default)]
 struct Offsets([u32; 16]);
 
@@ -332,7 +332,7 @@ impl ColumnForm<u64> for VertexNumbers {
     }
 }
 
-/// RotatedNodes of rotated tetrahedra, in order of their smallest vertices: four columns of mostly tiny differences.
+/// Nodes of rotated tetrahedra, in order of their smallest vertices: four columns of mostly tiny differences.
 pub(super) struct RotatedNodes;
 
 /// The number that node `I` of a tetrahedron is compared with: the nearest one already known.
@@ -392,7 +392,7 @@ impl ColumnForm<[u32; 4]> for RotatedNodes {
         let [first, second, third, fourth] = &steps;
         let rest = second.iter().zip(third).zip(fourth);
         let mut before = [0; 4];
-        // In one pass, for each node's base is among those just found.
+        // All nodes in one pass, because the base of each node is among those just read.
         for (r, (&a, ((&b, &c), &d))) in records.iter_mut().zip(first.iter().zip(rest)) {
             let mut nodes = [0; 4];
             nodes[0] = unzigzag32(a, base::<0>(&nodes, &before));
@@ -406,7 +406,7 @@ impl ColumnForm<[u32; 4]> for RotatedNodes {
     }
 }
 
-/// RotatedNodes in any even order: those of the rotated tetrahedra, then which of [`TURNS`] turns each back.
+/// Nodes in any even order: those of the rotated tetrahedra, and the position in [`TURNS`] of the order that turns each back.
 pub(super) struct TurnedNodes;
 
 /// The even orders of four nodes.
@@ -425,7 +425,7 @@ const TURNS: [[usize; 4]; 12] = [
     [3, 1, 0, 2],
 ];
 
-/// Shape: `TURN_OF[i][j]` = the place in [`TURNS`] of the order whose first node is number `i` and whose second is number `j`.
+/// Shape: `TURN_OF[i][j]` = the position in [`TURNS`] of the order whose first node is number `i` and whose second is number `j`.
 const TURN_OF: [[u8; 4]; 4] = {
     let (mut table, mut n) = ([[NO_TURN; 4]; 4], 0);
     while n < TURNS.len() {
@@ -435,10 +435,10 @@ const TURN_OF: [[u8; 4]; 4] = {
     }
     table
 };
-/// One node cannot be two.
+/// Entry for two equal nodes, which no order has.
 const NO_TURN: u8 = u8::MAX;
 
-/// The rotated nodes, and the place in [`TURNS`] that turns them back.
+/// The rotated nodes, and the position in [`TURNS`] that turns them back.
 fn turned(nodes: [u32; 4]) -> ([u32; 4], u8) {
     let rotated = SealedTet { nodes, region: 0 }.rotated().nodes;
     let [a, b, c, _] = rotated;

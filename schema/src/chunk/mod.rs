@@ -1,8 +1,9 @@
 //! Sealed chunks: records of one kind, differences and varints, zstd, a checksummed head.
 //!
-//! [`Packer`] cuts a stream of records into well filled chunks, [`Encoder`] and [`Decoder`] do one chunk.
-//! A decoder reads whatever a disk returns. Damage is an error, never a panic, and the checked count of the head bounds what
-//! is allocated.
+//! [`Packer`] cuts a stream of records into well filled chunks. [`Encoder`] and [`Decoder`] process one chunk.
+//!
+//! A decoder accepts any bytes that a disk returns. Damage is an error, never a panic, and the checked count of the head bounds the
+//! allocation.
 
 mod codec;
 mod column;
@@ -79,13 +80,13 @@ pub struct ChunkAddress {
 }
 
 impl ChunkAddress {
-    /// Its key in the file.
+    /// Key of the chunk in the file.
     pub const fn key(self) -> u64 {
         self.kind.key(self.chunk)
     }
 }
 
-/// A damaged chunk, or a chunk of another place.
+/// A damaged chunk, or a chunk from another place.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("sub-domain {}, {:?} chunk {}: {reason}", address.subdomain, address.kind, address.chunk)]
 pub struct ChunkError {
@@ -135,7 +136,7 @@ pub enum ChunkDamage {
 pub trait ChunkRecord: Copy {
     /// The kind of its chunks.
     const KIND: ChunkKind;
-    /// Most records of a chunk, whatever they compress to: bounds what decoding allocates.
+    /// Largest number of records of a chunk, whatever their compressed size. Bounds the memory for decoding.
     const COUNT_MAX: usize;
     /// More bytes than a record can take before compression.
     const RAW_BYTES_MAX: usize;

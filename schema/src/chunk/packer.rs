@@ -9,7 +9,7 @@ use super::{CHUNK_BYTES_MAX, ChunkAddress, ChunkRecord, Encoder};
 /// The fill that the guess aims at. Higher: more chunks overflow and are encoded again. Lower: bytes are wasted.
 /// With 0.98 the chunks of a random Delaunay mesh come out 0.976 to 0.978 full.
 const FILL_AIM: f64 = 0.98;
-/// A chunk below this is tried again with more records, when there are some.
+/// A chunk filled less than this is encoded again with more records, if there are any.
 const FILL_LEAST: f64 = 0.95;
 /// Attempts to fill a chunk better; attempts to make it fit are not limited.
 const GROWTH_ATTEMPTS: u32 = 2;
@@ -67,7 +67,7 @@ impl<R: ChunkRecord> Packer<R> {
     #[inline]
     pub fn push(&mut self, record: R) -> std::io::Result<Option<PackedChunk<R>>> {
         self.pending.push(record);
-        // More than the guess, so that a chunk that came out short can grow.
+        // More records than guessed, so that a chunk that came out short can grow.
         if self.pending.len() < (self.guess + self.guess / 8).min(R::COUNT_MAX) {
             return Ok(None);
         }
@@ -89,7 +89,7 @@ impl<R: ChunkRecord> Packer<R> {
         }
         let mut n =
             if most <= self.guess + self.guess / 16 { most } else { self.guess.clamp(1, most) };
-        // `fits` is known to fit, `bursts` not to.
+        // `fits` records are known to fit, `bursts` records are known not to fit.
         let (mut fits, mut bursts) = (0, most + 1);
         let mut growths = 0;
         loop {

@@ -1,12 +1,12 @@
-//! Summaries of chunks: boxes, ranges and counts that tell a reader which chunks to skip.
+//! Summaries of chunks: boxes, ranges and counts, by which a reader skips chunks.
 
 use super::columns::{ColumnReader, ColumnWriter, Malformed};
 use super::{ChunkKind, ChunkRecord};
 
-/// Of a chunk of tetrahedra; 128 bytes.
+/// Summary of a chunk of tetrahedra; 128 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TetSummary {
-    /// Box of its vertices: low corner, high corner.
+    /// Bounding box of the vertices: low corner, high corner.
     pub bounds: [[f64; 3]; 2],
     /// Sum of the volumes in order.
     pub volume: f64,
@@ -24,24 +24,24 @@ pub struct TetSummary {
     pub open_faces: u32,
     /// Bytes of the stored value.
     pub bytes: u32,
-    /// Not less than the length of any edge; 0 where that is not known.
+    /// Upper bound of all edge lengths; 0 if unknown.
     pub edge_max: f32,
 }
 
-/// Of a chunk of vertices; 64 bytes.
+/// Summary of a chunk of vertices; 64 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexSummary {
-    /// Low and high corner of the box around its vertices.
+    /// Bounding box: low corner, high corner.
     pub bounds: [[f64; 3]; 2],
     /// Number of the first record.
     pub first: u32,
     /// Number of records.
     pub count: u32,
-    /// Cells of the box, divided in four along each axis, have vertices: bit x + 4 y + 16 z. 0: not known.
+    /// Cells with vertices: bit x + 4 y + 16 z, in the box divided in four along each axis. 0 if unknown.
     pub cells: u64,
 }
 
-/// Of a chunk of facets or interface faces; 16 bytes.
+/// Summary of a chunk of facets or interface faces; 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RangeSummary<const INTERFACE: bool> {
     /// Number of the first record.
@@ -53,7 +53,7 @@ pub struct RangeSummary<const INTERFACE: bool> {
 /// A number, or an array of them, of fixed width and little-endian.
 trait Fixed: Sized {
     fn put(&self, bytes: &mut Vec<u8>);
-    /// Takes it from the front.
+    /// Takes a value from the front of `bytes`.
     fn take(bytes: &mut &[u8]) -> Self;
 }
 
@@ -82,7 +82,8 @@ impl<T: Fixed, const N: usize> Fixed for [T; N] {
     }
 }
 
-/// Both directions of a summary: its fields in order, then zeros up to its width. The given function checks a summary that was read.
+/// Generates both directions of a summary: its fields in order, then zeros up to its width. The given function checks a summary that was
+/// read.
 macro_rules! fixed_fields {
     ($check:expr; $($field:ident),+) => {
         const RAW_BYTES_MAX: usize = Self::BYTES;
@@ -127,7 +128,7 @@ impl TetSummary {
     /// Bytes of a summary.
     pub const BYTES: usize = 128;
 
-    /// True if some chunk can have it.
+    /// True if a chunk can have this summary.
     fn is_sound(&self) -> bool {
         let [least, most] = self.quality;
         is_box(&self.bounds)
@@ -153,12 +154,12 @@ impl VertexSummary {
     /// Bytes of a summary.
     pub const BYTES: usize = 64;
 
-    /// The bits of the cells of a box that some points in it are in.
+    /// Bits of the cells of a box that contain at least one of the points.
     pub fn cells_of(bounds: &[[f64; 3]; 2], points: impl Iterator<Item = [f64; 3]>) -> u64 {
         let cell = |axis: usize, x: f64| {
             let [low, high] = [bounds[0][axis], bounds[1][axis]];
             let share = (x - low) / (high - low);
-            // A box without extent gives no number, which becomes 0.
+            // For a box without extent this is not a number, and becomes 0.
             (share * 4.0).clamp(0.0, 3.0) as u32
         };
         points.fold(0, |cells, p| {
@@ -166,9 +167,9 @@ impl VertexSummary {
         })
     }
 
-    /// Boxes that hold all its vertices: of the cells that have some, a little larger than they are; or of the whole.
+    /// Boxes that together contain all vertices: the cells with vertices, slightly enlarged, or the whole box.
     pub fn cells(&self) -> impl Iterator<Item = [[f64; 3]; 2]> + '_ {
-        /// More than what rounding moves a border by, in extents of the box.
+        /// Enlargement of a cell, in extents of the box; more than rounding can move a border.
         const SLACK: f64 = 1e-9;
         let whole = (self.cells == 0).then_some(self.bounds);
         let bits = (0..64u32).filter(|i| self.cells >> i & 1 == 1);

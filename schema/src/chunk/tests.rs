@@ -70,7 +70,7 @@ fn faces(n: u32) -> Vec<InterfaceFace> {
         .collect()
 }
 
-/// Of a coarse snapshot: any even turn of the nodes, in any order.
+/// Tetrahedra of a coarse snapshot: nodes in any even order, tetrahedra in any order.
 fn coarse_tets(n: u32) -> Vec<CoarseTet> {
     let mut next = random(3);
     (tets(n).into_iter().enumerate())
@@ -180,7 +180,7 @@ fn chunks_are_well_filled() {
     }
 }
 
-/// Puts the checksum right again, so that what lies behind it is tested too.
+/// Recomputes the checksum, so that the content behind it is tested too.
 fn mend(value: &mut [u8]) {
     let sum = xxhash_rust::xxh3::xxh3_64(&value[8..]);
     value[..8].copy_from_slice(&sum.to_le_bytes());
@@ -206,7 +206,7 @@ fn damage<R: ChunkRecord>(records: &[R]) {
         let short = next() as usize % value.len();
         assert!(decoder.decode(&value[..short], chunk.address, &mut some).is_err());
     }
-    // Random columns behind an honest head.
+    // Random columns behind a valid head.
     for round in 0..400 {
         let mut raw: Vec<u8> = (0..next() % 3000).map(|_| next() as u8).collect();
         if round % 2 == 0 {

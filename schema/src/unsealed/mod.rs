@@ -1,7 +1,7 @@
-//! Finished sub-domains that were not sealed: the same records in the same order, in working pages.
+//! Finished sub-domains that were not sealed: working pages with the same records in the same order.
 //!
-//! Record `n` is in slot `n % 2046` of page `n / 2046`. Two more words of a record stand four to a slot in pages of another kind:
-//! attributes of tetrahedra and vertices, the tetrahedra on the sides of facets.
+//! Record `n` is in slot `n % 2046` of page `n / 2046`. Some kinds of records have two more words in pages of another kind, four
+//! records to a slot. These are the attributes of tetrahedra and vertices, and the tetrahedra on the sides of facets.
 
 mod pack;
 mod records;

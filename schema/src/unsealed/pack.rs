@@ -6,7 +6,7 @@ use crate::page::{
     u32_le,
 };
 
-/// A page of records ready to be stored, and the page of extra words if that is full too.
+/// A page of records ready to be stored, with the page of extra words if that is full too.
 pub struct PageSet<R> {
     /// Number of the page.
     pub page: u32,
@@ -22,7 +22,7 @@ pub struct PageSet<R> {
 pub struct PagePacker<R> {
     subdomain: u32,
     generation: u32,
-    /// Records in pages that are out.
+    /// Number of records in pages that were returned.
     first: u32,
     pending: Vec<R>,
     slots: Vec<Slot>,
@@ -44,12 +44,12 @@ impl<R: PageRecord> PagePacker<R> {
         }
     }
 
-    /// Records taken so far.
+    /// Number of records taken so far.
     pub fn count(&self) -> u64 {
         u64::from(self.first) + self.pending.len() as u64
     }
 
-    /// Pages of records so far.
+    /// Number of pages of records so far.
     pub fn pages(&self) -> u32 {
         self.first.div_ceil(RECORDS as u32)
     }
@@ -71,7 +71,7 @@ impl<R: PageRecord> PagePacker<R> {
 
     fn page(&mut self, last: bool) -> PageSet<R> {
         let page = self.first / RECORDS as u32;
-        // A free slot of tetrahedra is marked; among other records only the count ends them.
+        // Free slots of tetrahedra are marked. For other records, only the count marks the end.
         let empty = [u32_le::from_native(if R::PAGE == PageKind::Tets { NONE } else { 0 }); 8];
         let mut values = vec![self.sealed(R::PAGE, page, &self.slots, empty)];
         self.slots.clear();

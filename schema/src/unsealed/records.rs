@@ -16,7 +16,7 @@ const TAG_BITS: u32 = 3;
 /// The links and flags of a working tetrahedron, which a sealed one lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TetLinks {
-    /// For each face the one on its other side, as 4 · tetrahedron + face with the tetrahedron's number, or [`NONE`].
+    /// For each face, the face on its other side as 4 · tetrahedron + face, or [`NONE`].
     pub neighbors: [u32; 4],
     /// Bit i: face i is required.
     pub required: u8,
@@ -45,7 +45,7 @@ pub trait PageRecord: ChunkRecord {
 }
 
 impl SealedTet {
-    /// As a working tetrahedron.
+    /// The record as a working tetrahedron.
     pub fn to_working(self, place: &TetLinks) -> WorkingWords {
         let required = |i: usize| {
             if place.required >> i & 1 == 1 { REQUIRED } else { 0 }
@@ -76,7 +76,7 @@ impl PageRecord for SealedTet {
 }
 
 impl SealedVertex {
-    /// As a working vertex of sub-domain `rank`: fixed unless the mesher added it, and without a tetrahedron.
+    /// The record as a working vertex of sub-domain `rank`: fixed unless the mesher added it, and without a tetrahedron.
     pub fn to_working(self, rank: u32) -> WorkingWords {
         let id = VertexId::from_number(self.id);
         let (cut, index) = match id.map(|id| (id.owner, id.index)) {
@@ -127,7 +127,7 @@ impl PageRecord for SealedVertex {
     }
 }
 
-/// A tetrahedron's number as an id, or none.
+/// A tetrahedron's number as an id; [`NONE`] stays.
 fn tet_id(n: u32) -> u32 {
     if n == NONE { NONE } else { sparse(n) }
 }
@@ -137,7 +137,7 @@ fn tet_number(id: u32) -> u32 {
 }
 
 impl SealedFacet {
-    /// As a working facet.
+    /// The record as a working facet.
     pub fn to_working(self) -> WorkingWords {
         let facet = WorkingFacet {
             vertices: self.vertices.map(sparse),
@@ -166,7 +166,7 @@ impl PageRecord for SealedFacet {
 }
 
 impl InterfaceFace {
-    /// As a working interface face of sub-domain `rank`; lower ranks are on the low side of a cut.
+    /// The record as a working interface face of sub-domain `rank`. Lower ranks are on the low side of a cut.
     pub fn to_working(self, rank: u32) -> WorkingWords {
         let [a, b, c] = self.vertices.map(sparse);
         let side = u32::from(rank > self.other);

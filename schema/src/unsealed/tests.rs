@@ -8,7 +8,7 @@ use crate::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
 const RANK: u32 = 3;
 const GENERATION: u32 = 9;
 
-/// Through pages and back.
+/// Writes records to pages and reads them back.
 fn through<R: PageRecord>(records: &[R], working: impl Fn(R) -> WorkingWords) -> Vec<R> {
     let mut packer = PagePacker::new(RANK, GENERATION);
     let mut values = std::collections::BTreeMap::new();

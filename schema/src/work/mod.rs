@@ -1,6 +1,6 @@
-//! Work done elsewhere: orders and receipts, as files of the folder `work` and as messages between processes.
+//! Work for other processes: orders and receipts, as files of the folder `work` and as messages.
 //!
-//! None of it is part of a finished store, and it has a version of its own. Bytes of a file or message:
+//! No part of it belongs to a finished store, and the format has a version of its own. Bytes of a file or message:
 //!
 //! | bytes | content |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Orders: one unit of work each, with everything a worker needs beside the store's files and the size field.
+//! Orders: one unit of work each, with everything that a worker needs in addition to the store's files and the size field.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ pub enum WorkOrder {
 }
 
 impl WorkOrder {
-    /// The name of the file it begins with.
+    /// Name of the file that the work starts from.
     pub fn input(&self) -> String {
         let mesh = match self {
             Self::Cut(order) => &order.parent,

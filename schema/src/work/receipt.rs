@@ -1,4 +1,4 @@
-//! Receipts: the results of orders, as the catalog takes them in.
+//! Receipts: the results of orders, in the form in which the catalog records them.
 
 use rkyv::{Archive, Deserialize, Serialize};
 
@@ -28,9 +28,9 @@ pub struct CutReceipt {
     pub faces: u32,
     /// Faces of earlier cuts that the high child took over.
     pub inherited: Vec<InheritedFace>,
-    /// Meshes on the way, where they are kept.
+    /// Kept intermediate meshes, if any.
     pub stages: Vec<StageRow>,
-    /// Bytes of [`StageFaces`](crate::topology::StageFaces), where stages are kept.
+    /// Bytes of [`StageFaces`](crate::topology::StageFaces), if stages are kept.
     pub stage_faces: Vec<u8>,
     /// The row to append.
     pub journal: JournalRow,
@@ -45,7 +45,7 @@ pub struct SubdomainReceipt {
     pub coarse: u32,
     /// Its row.
     pub row: SubdomainRow,
-    /// The coarse snapshot, where it is kept.
+    /// The coarse snapshot, if kept.
     pub kept: Option<CoarseRow>,
     /// Bytes of [`SubdomainTotals`](crate::totals::SubdomainTotals).
     pub totals: Vec<u8>,
@@ -66,7 +66,7 @@ pub struct InheritedFace {
     pub side: u32,
 }
 
-/// Pages read and written, and the most held at once.
+/// Pages read and written, and the largest number held at once.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Traffic {
     /// Pages that came from a file.

@@ -7,7 +7,7 @@ use super::{Receipt, WorkOrder};
 /// The file `plan`: parameters common to all tasks.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq)]
 pub struct PlanRecord {
-    /// Differs between any two plans: receipts of another plan do not count.
+    /// Identifies the plan. Receipts of another plan do not count.
     pub run: u64,
     /// Version of the recipe.
     pub recipe: u32,
@@ -58,13 +58,13 @@ pub struct TaskReceipts {
     pub attempt: String,
     /// Names and lengths of its files.
     pub files: Vec<(String, u64)>,
-    /// Cuts after those above them.
+    /// Receipts; each cut comes after the cuts above it.
     pub receipts: Vec<Receipt>,
     /// Seconds it took.
     pub seconds: f64,
 }
 
-/// The file `task-00017.mark`, as JSON: the process at a task, or the last one.
+/// The file `task-00017.mark`, as JSON: the process that performs a task, or the last one that did.
 #[derive(serde::Serialize, serde::Deserialize, Clone, Debug, PartialEq)]
 pub struct TaskMark {
     /// Name of its machine.

@@ -1,4 +1,4 @@
-//! Answers in files: `.csv`, `.jsonl`, `.npy` and `.vtu`.
+//! Files of answers: `.csv`, `.jsonl`, `.npy` and `.vtu`.
 
 use std::path::Path;
 
@@ -6,10 +6,12 @@ use super::{AnswerColumn, AnswerRow, AnswerValue, Code, Error, Settings, csv_hea
 use tetdb_io::write::{NpyField, NpyTable, SelectedTet, SelectedVtu, TextFile};
 use tetdb_store::query::Hit;
 
-/// Share of the memory cap that a file of answers may hold.
+/// Share of the memory cap for writing a file of answers.
 const MEMORY_SHARE: u64 = 16;
 
-/// A file of answers, row by row; the ending of its name tells the format. The file has its name once it is finished.
+/// A file of answers, written row by row. The ending of its name selects the format.
+///
+/// The file gets its name when it is finished.
 ///
 /// ```
 /// # use tetdb_engine::api as tetdb;
@@ -29,7 +31,7 @@ const MEMORY_SHARE: u64 = 16;
 pub struct AnswerFile {
     columns: Vec<AnswerColumn>,
     format: Format,
-    /// Scratch of one row.
+    /// Scratch buffer for one row.
     bytes: Vec<u8>,
 }
 
@@ -37,12 +39,12 @@ enum Format {
     Csv(TextFile),
     JsonLines(TextFile),
     Npy(NpyTable),
-    /// Tetrahedra with their own columns.
+    /// Tetrahedra with a fixed set of columns.
     Vtu(SelectedVtu),
 }
 
 impl AnswerFile {
-    /// Begins a file with these columns; `.vtu` has columns of its own. Errors: `unknown-format`; the disk.
+    /// Creates a file with these columns. A `.vtu` file has a fixed set of columns instead. Errors: `unknown-format`; the disk.
     pub fn create(
         out: impl AsRef<Path>,
         columns: &[AnswerColumn],
@@ -90,7 +92,7 @@ impl AnswerFile {
         Ok(())
     }
 
-    /// Ends the file and gives it its name. Returns its length in bytes. Errors: the disk.
+    /// Finishes the file and gives it its name. Returns its length in bytes. Errors: the disk.
     pub fn finish(self) -> Result<u64, Error> {
         Ok(match self.format {
             Format::Csv(file) | Format::JsonLines(file) => file.finish()?,
@@ -100,7 +102,7 @@ impl AnswerFile {
     }
 }
 
-/// NumPy's name of a column's type; rows without a tetrahedron have -1 and NaN.
+/// NumPy type of a column. Rows without a tetrahedron have -1 or NaN.
 fn field(column: AnswerColumn) -> NpyField {
     let (kind, shape) = match column {
         AnswerColumn::Point => ("<f8", "3"),
@@ -114,7 +116,7 @@ fn field(column: AnswerColumn) -> NpyField {
     NpyField { name: column.name(), kind, shape }
 }
 
-/// A row as NumPy's bytes.
+/// Encodes a row in NumPy's binary layout.
 fn numpy_row(row: &AnswerRow, columns: &[AnswerColumn], bytes: &mut Vec<u8>) {
     bytes.clear();
     for &column in columns {

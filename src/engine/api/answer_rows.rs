@@ -1,4 +1,4 @@
-//! Answers as rows of named columns.
+//! Answers as rows with named columns.
 
 use super::VARIABLES;
 use serde_json::{Map, Value, json};
@@ -8,17 +8,17 @@ use tetdb_store::query::Hit;
 /// A column of answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnswerColumn {
-    /// The point that was located, of [`AnswerRow::from_point`].
+    /// The located point; see [`AnswerRow::from_point`].
     Point,
-    /// Shares of the four corners in this point.
+    /// Barycentric coordinates of the located point.
     Barycentric,
     /// Id of the tetrahedron.
     Id,
-    /// Ids of its four vertices.
+    /// Ids of the four vertices.
     Vertices,
-    /// Positions of its four vertices.
+    /// Positions of the four vertices.
     Points,
-    /// A number: the position of its name in [`VARIABLES`].
+    /// A variable of conditions, as a position in [`VARIABLES`].
     Variable(usize),
 }
 
@@ -26,7 +26,7 @@ const REGION: usize = 1;
 const SUBDOMAIN: usize = 2;
 
 impl AnswerColumn {
-    /// The column of this name: `id`, `vertices`, `points` or one of [`VARIABLES`].
+    /// The column named `id`, `vertices`, `points` or one of [`VARIABLES`].
     pub fn from_name(name: &str) -> Option<Self> {
         Some(match name {
             "id" => Self::Id,
@@ -36,7 +36,7 @@ impl AnswerColumn {
         })
     }
 
-    /// Its name.
+    /// Name of the column.
     pub fn name(self) -> &'static str {
         match self {
             Self::Point => "point",
@@ -48,12 +48,12 @@ impl AnswerColumn {
         }
     }
 
-    /// True if its values are integers.
+    /// Returns whether the column's values are integers.
     pub fn is_integer(self) -> bool {
         matches!(self, Self::Variable(REGION | SUBDOMAIN))
     }
 
-    /// Number of its values in a row.
+    /// Number of values of this column in a row.
     pub fn width(self) -> usize {
         match self {
             Self::Point => 3,
@@ -73,16 +73,16 @@ pub enum AnswerValue {
     Integer(i64),
     /// A number.
     Number(f64),
-    /// None: the point lies outside of the mesh.
+    /// No value: the point lies outside the mesh.
     Missing,
 }
 
-/// One answer: a tetrahedron, or a point with the tetrahedron that holds it.
+/// One answer: a tetrahedron, or a located point with the tetrahedron that contains it.
 #[derive(Clone, Copy, Debug)]
 pub struct AnswerRow {
-    /// The tetrahedron; `None` where a point lies outside of the mesh.
+    /// The tetrahedron; `None` if a located point lies outside the mesh.
     pub hit: Option<Hit>,
-    /// The point that was located, and the shares of the corners in it.
+    /// The located point and its barycentric coordinates.
     pub located: Option<([f64; 3], [f64; 4])>,
 }
 
@@ -93,13 +93,13 @@ impl From<Hit> for AnswerRow {
 }
 
 impl AnswerRow {
-    /// A point with the answer of [`Store::locate_barycentric`](super::Store::locate_barycentric).
+    /// The row of a located point, from the result of [`Store::locate_barycentric`](super::Store::locate_barycentric).
     pub fn from_point(point: [f64; 3], found: Option<(Hit, [f64; 4])>) -> Self {
         let shares = found.map_or([f64::NAN; 4], |(_, shares)| shares);
         Self { hit: found.map(|(hit, _)| hit), located: Some((point, shares)) }
     }
 
-    /// The values of a column. Shape: [`AnswerColumn::width`] values.
+    /// Values of a column. Shape: [`AnswerColumn::width`] values.
     pub fn values(&self, column: AnswerColumn) -> Vec<AnswerValue> {
         let numbers = |list: &[f64]| list.iter().map(|&x| AnswerValue::Number(x)).collect();
         if let (AnswerColumn::Point, Some((point, _))) = (column, self.located) {
@@ -123,7 +123,7 @@ impl AnswerRow {
         }
     }
 
-    /// The row as a JSON object, a key for each column.
+    /// The row as a JSON object with a key for each column.
     pub fn object(&self, columns: &[AnswerColumn]) -> Value {
         let mut object = Map::new();
         object.insert("schema".to_owned(), json!(1));
@@ -142,7 +142,7 @@ impl AnswerRow {
         Value::Object(object)
     }
 
-    /// The row as values with commas between them; parallel to [`csv_head`].
+    /// The row as comma-separated values, in the order of [`csv_head`].
     pub fn csv(&self, columns: &[AnswerColumn]) -> String {
         let values = columns.iter().flat_map(|&column| self.values(column));
         let words = values.map(|value| match value {
@@ -155,7 +155,7 @@ impl AnswerRow {
     }
 }
 
-/// The names of all values of a row with commas between them.
+/// Comma-separated names of all values of a row.
 pub fn csv_head(columns: &[AnswerColumn]) -> String {
     let names = columns.iter().flat_map(|&column| {
         let name = column.name();

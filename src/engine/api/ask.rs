@@ -1,4 +1,4 @@
-//! Questions about tetrahedra.
+//! Questions: selecting tetrahedra of a store.
 
 use super::guard::guarded_in;
 use super::{Condition, Error, Store, VARIABLES};
@@ -9,12 +9,12 @@ pub use tetdb_schema::ids::{TetId, VertexId};
 pub use tetdb_store::query::Measures as ChunkCounts;
 use tetdb_store::query::{Hit, Ordered, QueryError, QuerySession, Selection, Solid};
 
-/// Share of the memory cap for answers that are sorted; the session holds three quarters of the cap.
+/// Share of the memory cap for sorting answers. The session holds three quarters of the cap.
 const SORTED_SHARE: u64 = 8;
-/// The place of quality among the [`VARIABLES`].
+/// Position of quality in [`VARIABLES`].
 const QUALITY: usize = 0;
 
-/// Which answers come first.
+/// Order of sorted answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// The least value first.
@@ -23,7 +23,7 @@ pub enum Order {
     Falling,
 }
 
-/// A question: the tetrahedra that all of it holds of; without a condition, all there are.
+/// A question: selects the tetrahedra that fulfill all of its conditions. Without a condition, it selects all.
 ///
 /// ```
 /// # use tetdb_engine::api as tetdb;
@@ -46,7 +46,7 @@ pub struct Query<'s> {
     limit: Option<usize>,
 }
 
-/// Answers as they are found. After an error there are no more.
+/// Iterator over the answers, which are found on demand. An error is the last item.
 pub struct Answers<'s> {
     context: RunContext,
     found: Option<Hits<'s>>,
@@ -56,12 +56,12 @@ pub struct Answers<'s> {
 type Hits<'s> = Box<dyn Iterator<Item = Result<Hit, QueryError>> + 's>;
 
 impl Store {
-    /// Begins a question about tetrahedra.
+    /// Starts a question about tetrahedra.
     pub fn query(&mut self) -> Query<'_> {
         Query::new(self)
     }
 
-    /// Counts the chunks that all questions so far have read, and those that there are. Errors: as [`Query::answers`].
+    /// Number of chunks that all questions so far have read, and number of all chunks. Errors: as [`Query::answers`].
     pub fn chunk_counts(&mut self) -> Result<ChunkCounts, Error> {
         self.with_session(|session| Ok(session.measures()))
     }
@@ -72,105 +72,107 @@ impl<'s> Query<'s> {
         Self { store, selection: Selection::default(), order: None, limit: None }
     }
 
-    /// They meet the box between two corners.
+    /// Selects tetrahedra that meet the box between two corners.
     pub fn in_box(mut self, low: [f64; 3], high: [f64; 3]) -> Self {
         let [low, high] = [low, high].map(Point::from_array);
         self.selection.solids.push(Solid::Box(Aabb { low, high }));
         self
     }
 
-    /// They meet the ball.
+    /// Selects tetrahedra that meet the ball.
     pub fn in_sphere(mut self, center: [f64; 3], radius: f64) -> Self {
         let center = Point::from_array(center);
         self.selection.solids.push(Solid::Sphere { center, radius });
         self
     }
 
-    /// They meet the plane through `point`.
+    /// Selects tetrahedra that meet the plane through `point`.
     pub fn at_plane(mut self, point: [f64; 3], normal: [f64; 3]) -> Self {
         let [point, normal] = [point, normal].map(Point::from_array);
         self.selection.solids.push(Solid::Plane { point, normal });
         self
     }
 
-    /// They lie wholly in each box and ball, instead of only meeting them.
+    /// Selects only tetrahedra that lie completely inside each box and ball.
     pub fn inside(mut self) -> Self {
         self.selection.inside = true;
         self
     }
 
-    /// They are in one of these sub-domains.
+    /// Selects tetrahedra in one of these sub-domains.
     pub fn in_subdomains(mut self, ranks: &[u32]) -> Self {
         self.selection.subdomains = Some(ranks.to_vec());
         self
     }
 
-    /// They are in one of these regions.
+    /// Selects tetrahedra in one of these regions.
     pub fn in_regions(mut self, regions: &[u32]) -> Self {
         self.selection.regions = Some(regions.to_vec());
         self
     }
 
-    /// They are in a region of this name. Errors: `no-such-part`.
+    /// Selects tetrahedra in a region with this name. Errors: `no-such-part`.
     pub fn in_region_called(mut self, name: &str) -> Result<Self, Error> {
         let found = self.store.summary().regions_called(name)?;
         self.selection.regions.get_or_insert_default().extend(found);
         Ok(self)
     }
 
-    /// They stand on an input triangle with one of these labels, positions in [`Summary::labels`](super::Summary::labels).
+    /// Selects tetrahedra on an input triangle with one of these labels. Labels are positions in
+    /// [`Summary::labels`](super::Summary::labels).
     pub fn on_labels(mut self, labels: &[u32]) -> Self {
         self.selection.labels = Some(labels.to_vec());
         self
     }
 
-    /// They have a face on the interface of these two sub-domains.
+    /// Selects tetrahedra with a face on the interface of these two sub-domains.
     pub fn on_interface(mut self, low: u32, high: u32) -> Self {
         self.selection.interface = Some([low, high]);
         self
     }
 
-    /// They have a vertex of the surface.
+    /// Selects tetrahedra with a vertex on the surface.
     pub fn touching_surface(mut self) -> Self {
         self.selection.touching_surface = true;
         self
     }
 
-    /// They have a face on an embedded sheet.
+    /// Selects tetrahedra with a face on an embedded sheet.
     pub fn touching_sheet(mut self) -> Self {
         self.selection.touching_sheet = true;
         self
     }
 
-    /// A condition on quality, region, subdomain, volume, x, y, z (of the centroid), edge_min, edge_max, angle_min, angle_max (degrees)
-    /// and excess (quality over the least that the faces on the surface allow),
-    /// such as `quality > 6 and region in [1, 2]`.
+    /// Selects tetrahedra that fulfill a condition such as `quality > 6 and region in [1, 2]`.
+    ///
+    /// Variables: quality, region, subdomain, volume, x, y, z (of the centroid), edge_min, edge_max, angle_min, angle_max (in degrees)
+    /// and excess (quality over the least that the faces on the surface allow).
     ///
     /// Errors: `bad-expression`, with the place.
     pub fn where_(self, condition: &str) -> Result<Self, Error> {
         Ok(self.condition(Condition::parse_located(condition)?))
     }
 
-    /// The condition holds of them; see [`Query::where_`].
+    /// Selects tetrahedra that fulfill the condition; see [`Query::where_`].
     pub fn condition(mut self, condition: Condition) -> Self {
         self.selection.condition = Some(condition.0);
         self
     }
 
-    /// They are among these.
+    /// Selects only among these tetrahedra.
     pub fn among(mut self, tets: &[TetId]) -> Self {
         self.selection.tets = Some(tets.to_vec());
         self
     }
 
-    /// They share a face with this tetrahedron. Replaces any other neighborhood. Errors: `no-such-part`; damage.
+    /// Selects tetrahedra that share a face with this one. Replaces any other neighborhood. Errors: `no-such-part`; damage.
     pub fn next_to(mut self, tet: TetId) -> Result<Self, Error> {
         self.selection.sharing =
             Some(self.store.with_session(|session| Ok(session.next_to(tet)?))?);
         Ok(self)
     }
 
-    /// They have all these vertices: the ball of one, the shell of an edge. Replaces any other neighborhood.
+    /// Selects tetrahedra that have all these vertices: the ball of one vertex, the shell of an edge. Replaces any other neighborhood.
     ///
     /// Errors: `no-such-part`; damage.
     pub fn around(mut self, vertices: &[VertexId]) -> Result<Self, Error> {
@@ -179,13 +181,13 @@ impl<'s> Query<'s> {
         Ok(self)
     }
 
-    /// Measures [`Hit::excess`] of the answers, which reads the faces on the surface.
+    /// Also computes [`Hit::excess`] of the answers, which requires reading the faces on the surface.
     pub fn with_excess(mut self) -> Self {
         self.selection.excess = true;
         self
     }
 
-    /// Sorts the answers by one of the numbers a condition may name. Errors: `bad-query`.
+    /// Sorts the answers by one of the [`VARIABLES`] of conditions. Errors: `bad-query`.
     pub fn order_by(mut self, variable: &str, order: Order) -> Result<Self, Error> {
         let Some(place) = VARIABLES.iter().position(|v| *v == variable) else {
             let message = format!("{variable}: expected one of {}", VARIABLES.join(", "));
@@ -196,13 +198,13 @@ impl<'s> Query<'s> {
         Ok(self)
     }
 
-    /// No more answers than `n`.
+    /// Limits the number of answers to `n`.
     pub fn limit(mut self, n: usize) -> Self {
         self.limit = Some(n);
         self
     }
 
-    /// The answers, found while they are taken. Errors: damage; too little memory.
+    /// Starts the search. Answers are found as they are taken. Errors: damage; too little memory.
     pub fn answers(self) -> Result<Answers<'s>, Error> {
         let memory = self.store.settings().cap()? / SORTED_SHARE;
         let Self { store, selection, order, limit } = self;
@@ -215,13 +217,13 @@ impl<'s> Query<'s> {
         Ok(Answers { context, found: Some(found), left: limit.unwrap_or(usize::MAX) })
     }
 
-    /// All answers at once. Errors: as [`Query::answers`].
+    /// Collects all answers. Errors: as [`Query::answers`].
     pub fn collect(self) -> Result<Vec<Hit>, Error> {
         self.answers()?.collect()
     }
 }
 
-/// Sorts what is selected. A few of the best or worst quality are found without a look at all chunks.
+/// Sorts the selected tetrahedra. A few of best or worst quality are found without reading all chunks.
 fn sorted<'s>(
     session: &'s mut QuerySession,
     selection: Selection,

@@ -1,4 +1,4 @@
-//! Two meshes side by side.
+//! Comparison of two meshes.
 
 use std::path::Path;
 
@@ -8,25 +8,25 @@ use super::store::open_finished;
 use super::{Error, Settings, guarded};
 use tetdb_store::audit::{Qualities, qualities};
 
-/// Most memory that the comparison of one mesh uses.
+/// Largest memory for reading one of the two meshes, in bytes.
 const MEMORY_MAX: u64 = 256 << 20;
 
-/// Qualities of two meshes, and whether they are the same mesh.
+/// Qualities of two meshes, and whether the meshes are equal.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct Comparison {
-    /// Whether the meshes are equal, down to the last bit of each coordinate.
+    /// True if the meshes are equal down to the last bit of each coordinate.
     pub same: bool,
     /// Qualities of the first mesh.
     pub first: Qualities,
     /// Qualities of the second mesh.
     pub second: Qualities,
-    /// Digests of the tetrahedra of both.
+    /// Digests of the tetrahedra of both meshes.
     pub digests: [String; 2],
 }
 
 impl Comparison {
-    /// Reads both meshes, one after the other.
+    /// Reads both meshes, one after the other, and compares them.
     ///
     /// # Errors
     /// `no-such-store`, `not-a-store`, `store-unfinished`, `damaged`.

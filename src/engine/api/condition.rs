@@ -1,4 +1,4 @@
-//! Conditions on tetrahedra.
+//! Conditions that select tetrahedra.
 
 use super::Error;
 pub use tetdb_base::expr::ExprError;
@@ -18,7 +18,7 @@ pub use tetdb_store::query::VARIABLES;
 pub struct Condition(pub(super) Expression);
 
 impl Condition {
-    /// Parses a condition. Errors: the byte at which `text` makes no sense, and why.
+    /// Parses a condition. Errors: the byte where `text` makes no sense, and the reason.
     pub fn parse(text: &str) -> Result<Self, ExprError> {
         let parsed = Expression::parse(text, &VARIABLES)?;
         if parsed.kind() == ExprKind::Truth {
@@ -28,7 +28,7 @@ impl Condition {
         Err(ExprError { at: 0, message })
     }
 
-    /// [`Condition::parse`] for a method of the front door. Errors: `bad-expression`.
+    /// [`Condition::parse`] with an [`Error`] for the caller. Errors: `bad-expression`.
     pub(super) fn parse_located(text: &str) -> Result<Self, Error> {
         Self::parse(text).map_err(|error| {
             Error::new(Code::BadExpression, &error)

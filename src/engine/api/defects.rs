@@ -1,17 +1,17 @@
-//! Where the defects of a surface are.
+//! Places of the defects of a surface.
 
 use tetdb_base::surface::{Defect, Validation};
 use tetdb_schema::code::Code;
 
-/// Where a defect is.
+/// Place of one defect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DefectPlace {
-    /// The word for it, one of [`Code`].
+    /// Code of the defect.
     pub code: Code,
-    /// The triangle it is about, and the second one where there are two. `None`: the surface has none.
+    /// The triangle with the defect, and a second one if two are involved; `None` if the defect has no such triangle.
     pub triangles: [Option<u32>; 2],
-    /// A position where it can be seen.
+    /// A position where the defect is visible.
     pub at: Option<[f64; 3]>,
 }
 

@@ -1,14 +1,14 @@
-//! What went wrong, in a form that any caller can act on.
+//! The error type of all calls.
 
 use std::fmt;
 
 use tetdb_base::storage::StorageError;
 use tetdb_schema::code::Code;
 
-/// Why a call did not do what was asked: a word, a message, a place and, where one is known, a way out.
+/// The reason why a call failed: a code, a message, a place and, if known, a remedy.
 ///
-/// The words are those of [`Code`], the same as the program's. Nothing of a failed call is left behind but a store that can be
-/// resumed. Messages name no option of any caller: which argument helps is the caller's knowledge.
+/// Codes are those of [`Code`], the same as the program's. A failed call leaves nothing behind, except a store that can be resumed.
+/// Messages name no option of any caller, because only the caller can tell which of its arguments helps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Error {
     code: Code,
@@ -20,16 +20,16 @@ pub struct Error {
     pub remedy: Remedy,
 }
 
-/// What would help, for a caller that has words of its own for it.
+/// A remedy that a caller can put in its own words.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[doc(hidden)]
 pub enum Remedy {
-    /// What [`Error::help`] says, if anything.
+    /// The text of [`Error::help`], if any.
     #[default]
     AsSaid,
-    /// The same, but any error with this code has it.
+    /// The text of [`Error::help`], which is the same for all errors with this code.
     General,
-    /// So many bytes of memory at least.
+    /// A larger memory cap, of at least this many bytes.
     Memory(u64),
 }
 
@@ -58,7 +58,7 @@ impl Error {
         self
     }
 
-    /// `option` is the first word of the message.
+    /// Sets the option, if the message begins with `option`.
     pub(super) fn with_option(mut self, option: Option<&'static str>) -> Self {
         self.option = option.filter(|option| self.message.starts_with(option));
         self
@@ -75,17 +75,17 @@ impl Error {
             .with_help("this is a bug; please report the call and this message")
     }
 
-    /// The word for it, one of [`Code::ALL`].
+    /// The code, one of [`Code::ALL`].
     pub fn code(&self) -> Code {
         self.code
     }
 
-    /// What happened.
+    /// The message.
     pub fn message(&self) -> &str {
         &self.message
     }
 
-    /// Where: a file with its line or byte, ids, coordinates.
+    /// The place of the failure: a file with its line or byte, ids, coordinates.
     pub fn place(&self) -> Option<&str> {
         self.place.as_deref()
     }
@@ -95,22 +95,22 @@ impl Error {
         StorageError::Cancelled.into()
     }
 
-    /// The option or argument that has no meaning, by its key in a file of options. The message begins with it.
+    /// The option or argument with a value that makes no sense, by its key in a file of options. The message begins with this key.
     pub fn option(&self) -> Option<&'static str> {
         self.option
     }
 
-    /// What to do about it.
+    /// Help: a way out, if one is known.
     pub fn help(&self) -> Option<&str> {
         self.help.as_deref()
     }
 
-    /// The exit code the program has for it.
+    /// Exit code of the program for this error.
     pub fn exit_code(&self) -> u8 {
         self.code.exit()
     }
 
-    /// Whether the run was cancelled; what it had finished is kept.
+    /// Returns whether the run was cancelled. Steps finished before that are kept.
     pub fn is_cancelled(&self) -> bool {
         self.code == "stopped"
     }

@@ -1,4 +1,4 @@
-//! Lengths at the vertices of a background mesh, given as arrays: the store keeps them as files of its own.
+//! Sizes on a background mesh given as arrays. The store keeps them as files of its own.
 
 use std::io::Write;
 use std::path::Path;
@@ -10,12 +10,12 @@ use super::Error;
 use tetdb_base::geom::Point;
 use tetdb_kernel::sizing::{Background, BackgroundMesh};
 
-/// What stands for the path of lengths that were given as arrays: a file in the store, and its mesh beside it.
+/// Recorded in place of a path for lengths given as arrays: a file in the store, with its mesh next to it.
 #[doc(hidden)]
 pub const IN_STORE: &str = "store:sizes.solb";
 const SIZES: &str = "sizes.solb";
 const MESH: &str = "sizes.meshb";
-/// Numbers of the format's version 3: integers of 4 bytes, coordinates and places of 8.
+/// Version 3 of the MEDIT format: integers of 4 bytes, coordinates and file positions of 8 bytes.
 const VERSION: i32 = 3;
 const DIMENSION: i32 = 3;
 const VERTICES: i32 = 4;
@@ -23,7 +23,7 @@ const TETRAHEDRA: i32 = 8;
 const END: i32 = 54;
 const SOL_AT_VERTICES: i32 = 62;
 
-/// A background mesh and a length at each of its vertices.
+/// A background mesh with a length at each vertex.
 #[derive(Clone, Debug, PartialEq)]
 #[doc(hidden)]
 pub struct FieldArrays {
@@ -66,14 +66,14 @@ fn check(points: &[[f64; 3]], tets: &[[u32; 4]], lengths: &[f64]) -> Result<(), 
 }
 
 impl FieldArrays {
-    /// Errors: what is no field, with its place.
+    /// Checks the arrays and copies them. Errors: arrays that form no field, with the place.
     #[doc(hidden)]
     pub fn new(points: &[[f64; 3]], tets: &[[u32; 4]], lengths: &[f64]) -> Result<Self, Error> {
         check(points, tets, lengths)?;
         Ok(Self { points: points.to_vec(), tets: tets.to_vec(), lengths: lengths.to_vec() })
     }
 
-    /// As the mesher asks it. Errors: `memory`, when it needs more than half of `cap`.
+    /// The background mesh for the mesher. Errors: `memory` if it needs more than half of `cap`.
     #[doc(hidden)]
     pub fn background(&self, cap: u64) -> Result<Background, Error> {
         let needed = BackgroundMesh::bytes(self.points.len() as u64, self.tets.len() as u64);
@@ -90,7 +90,7 @@ impl FieldArrays {
         ))))
     }
 
-    /// Puts its files into the store's folder. Errors: the disk.
+    /// Writes the two files to the store's folder. Errors: the disk.
     #[doc(hidden)]
     pub fn keep_in(&self, store: &Path) -> Result<(), Error> {
         for (name, bytes) in [(MESH, self.mesh()), (SIZES, self.sizes())] {
@@ -105,7 +105,7 @@ impl FieldArrays {
         Ok(())
     }
 
-    /// That of its files, as [`job`](super::job) takes it.
+    /// Hash of the two files, computed as [`job`](super::job) does for files.
     #[doc(hidden)]
     pub fn hash(&self) -> String {
         let mut all = Xxh3::new();
@@ -137,13 +137,13 @@ impl FieldArrays {
     }
 }
 
-/// Whether these lengths were given as arrays.
+/// Returns whether `file` stands for lengths given as arrays.
 #[doc(hidden)]
 pub fn is_in_store(file: &str) -> bool {
     file == IN_STORE
 }
 
-/// Sections of a binary MEDIT file: keyword, where the next begins, content.
+/// Builds a binary MEDIT file. Each section has a keyword, the position of the next section, and content.
 fn file_of(sections: &[(i32, Vec<u8>)]) -> Vec<u8> {
     let mut bytes: Vec<u8> = [1, VERSION].into_iter().flat_map(i32::to_le_bytes).collect();
     let mut section = |keyword: i32, content: &[u8]| {
@@ -191,7 +191,7 @@ mod tests {
         assert!(stopped.create(&begun).is_err_and(|e| e.is_cancelled()));
         let resumed = Store::resume(&begun, Settings::new()).unwrap();
         assert!(resumed.is_same_mesh(&store));
-        // The same job is on record, so that the mesh is there already.
+        // The store has the same job on record, so the finished mesh is returned.
         assert!(mesher.create(&begun).unwrap().is_same_mesh(&store));
         let plain = Mesher::new(Surface::sample("box,h=0.3").unwrap())
             .sizes(Sizes::interior(Length::units(0.4)));

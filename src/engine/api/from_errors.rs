@@ -1,4 +1,4 @@
-//! Errors of the modules below as [`Error`]s.
+//! Conversions of the errors of lower modules into [`Error`].
 
 use super::error::{Error, Remedy};
 use crate::pipeline::PipelineError;

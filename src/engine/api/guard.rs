@@ -1,4 +1,4 @@
-//! Nothing unwinds into the caller: failures, requests to stop and panics become errors.
+//! The boundary where unwinding ends: failures, cancellation and panics become errors.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use tetdb_schema::code::Code;
@@ -6,13 +6,13 @@ use tetdb_schema::code::Code;
 use super::{Error, Settings};
 use tetdb_base::storage::{RunContext, StorageError};
 
-// Failed page accesses travel by unwinding, which such a build turns into the end of the process.
+// Failed page accesses unwind; such a build would end the process instead.
 #[cfg(panic = "abort")]
 compile_error!(
     "tetdb needs `panic = \"unwind\"`: failures of the disk and requests to stop travel by unwinding, which never leaves a call"
 );
 
-/// Does `work` as a run of its own, with the threads and the token of `settings`.
+/// Runs `work` as a new run, with the threads and the token of `settings`.
 #[doc(hidden)]
 pub fn guarded<T>(
     settings: &Settings,
@@ -22,7 +22,7 @@ pub fn guarded<T>(
     guarded_in(&context, work)
 }
 
-/// Does `work` as part of a run that goes on.
+/// Runs `work` as part of an existing run.
 #[doc(hidden)]
 pub fn guarded_in<T>(
     context: &RunContext,
@@ -37,7 +37,7 @@ pub fn guarded_in<T>(
     }
 }
 
-/// Damage when it came from redb, which asserts what it reads; otherwise a bug of ours.
+/// The error for a panic: damage if it came from redb, which asserts what it reads; otherwise a bug of this program.
 #[doc(hidden)]
 pub fn of_panic(context: &RunContext) -> Error {
     match context.take_panic() {

@@ -1,4 +1,4 @@
-//! Everything a store has on record, finished or not.
+//! The record of a store, finished or not.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,55 +16,57 @@ use tetdb_schema::catalog::{
 use tetdb_schema::digest::Digest;
 use tetdb_store::store::Catalog;
 
-/// The record of a store. Serialized, it is the answer of `tetdb info --json`; the guide lists the keys.
+/// The record of a store.
+///
+/// Serialized, it is the answer of `tetdb info --json`; the guide lists the keys.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct StoreInfo {
     /// Path of the store.
     pub store: String,
-    /// Last step that was finished.
+    /// Last finished step.
     pub state: StoreState,
-    /// Whether the mesh is complete.
+    /// True if the mesh is complete.
     pub finished: bool,
-    /// Files, or the sample, that the surface came from.
+    /// The files, or the sample, that the surface was read from.
     pub surfaces: Vec<SurfaceSource>,
-    /// Options of the mesh as they are on record.
+    /// Recorded options of the mesh.
     pub options: Value,
     /// Version of the program that began the store.
     pub tool_version: String,
-    /// Names of the labels; a label is a position here.
+    /// Names of the labels. A label is a position in this list.
     pub labels: Vec<String>,
     /// Embedded edges and points by label.
     pub wires: Vec<EmbeddedInfo>,
-    /// Regions by number, empty ones among them.
+    /// Regions by number, including empty ones.
     pub regions: Vec<RegionInfo>,
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub tets: u64,
-    /// Triangles of the surface, where a store has them on record.
+    /// Number of triangles of the surface, if recorded.
     pub input_triangles: Option<u64>,
-    /// Vertices; one shared by several sub-domains counts in each.
+    /// Number of vertices. A vertex shared by several sub-domains counts in each.
     pub vertices: u64,
-    /// Low and high corner of the box around all vertices.
+    /// Low and high corner of the bounding box.
     pub bounds: [[f64; 3]; 2],
     /// Bytes of the sub-domains' files.
     pub bytes: u64,
     /// Bytes of the coarse snapshots.
     pub coarse_bytes: u64,
-    /// Bytes of the previous versions that an undo brings back.
+    /// Bytes of the previous versions that an undo restores.
     pub previous_bytes: u64,
     /// Bytes of the catalog.
     pub catalog_bytes: u64,
-    /// Digest of all tetrahedra: equal for equal meshes.
+    /// Digest of all tetrahedra. Equal meshes have equal digests.
     pub digest: String,
-    /// Meshes before and after the zones of cuts were refined, where they were kept.
+    /// Kept intermediate meshes: before and after the refinement of each cut's zone.
     pub stages: Vec<StageInfo>,
-    /// Sub-domains by rank.
+    /// Sub-domains, in order of rank.
     pub subdomains: Vec<SubdomainInfo>,
-    /// Pairs of sub-domains that share faces, by cut.
+    /// Pairs of sub-domains that share faces, in order of cut.
     pub interfaces: Vec<InterfaceRow>,
-    /// Steps that were done, in order.
+    /// Finished steps, in order.
     pub journal: Vec<JournalRow>,
-    /// Sub-domains with a previous version.
+    /// Number of sub-domains with a previous version.
     #[serde(skip)]
     pub n_previous: usize,
 }
@@ -75,9 +77,9 @@ pub struct StoreInfo {
 pub struct EmbeddedInfo {
     /// Name of the label.
     pub name: Option<String>,
-    /// Edges that have it.
+    /// Number of edges with this label.
     pub edges: u64,
-    /// Points that have it.
+    /// Number of points with this label.
     pub points: u64,
 }
 
@@ -85,22 +87,22 @@ pub struct EmbeddedInfo {
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct RegionInfo {
-    /// Its row in the catalog.
+    /// Row of the region in the catalog.
     #[serde(flatten)]
     pub row: RegionRow,
-    /// Its name, if it has one.
+    /// Name of the region, if any.
     pub name: Option<String>,
 }
 
-/// A mesh that was kept on the way to the finished one.
+/// A kept intermediate mesh.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct StageInfo {
     /// Number of the cut, from 1.
     pub cut: u32,
-    /// Before or after its zone was refined.
+    /// Before or after the refinement of the cut's zone.
     pub stage: Stage,
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub tets: u64,
     /// Bytes of its file.
     pub bytes: u64,
@@ -110,37 +112,37 @@ pub struct StageInfo {
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct SubdomainInfo {
-    /// Its rank, from 0.
+    /// Rank of the sub-domain, from 0.
     pub id: u32,
-    /// Whether it is finished, and how it is stored.
+    /// State: whether the sub-domain is finished, and how it is stored.
     pub state: SubdomainState,
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub tets: u64,
-    /// Vertices, those shared with others included.
+    /// Number of vertices, including those shared with other sub-domains.
     pub vertices: u64,
-    /// Facets of the input.
+    /// Number of input facets.
     pub facets: u64,
-    /// Faces shared with other sub-domains.
+    /// Number of faces shared with other sub-domains.
     pub interface_faces: u64,
-    /// Digest of its tetrahedra.
+    /// Digest of the sub-domain's tetrahedra.
     pub digest: String,
-    /// Digest of its interface faces.
+    /// Digest of the sub-domain's interface faces.
     pub interface_digest: String,
-    /// Neighbors and how many faces each shares; `None` before the topology is known.
+    /// Neighbors, and the number of faces shared with each; `None` before the topology is known.
     pub neighbors: Option<Vec<NeighborRow>>,
-    /// Qualities of its tetrahedra.
+    /// Qualities of the sub-domain's tetrahedra.
     pub quality: QualityRow,
     /// Greatest quality q; 1 is regular.
     pub worst_q: f64,
     /// Volume in cubed input units.
     pub volume: f64,
-    /// Low and high corner of the box around its vertices.
+    /// Low and high corner of the bounding box.
     pub bounds: [[f64; 3]; 2],
-    /// Bytes of its file.
+    /// Bytes of the sub-domain's file.
     pub bytes: u64,
-    /// Bytes of its coarse snapshot, if that was kept.
+    /// Bytes of the coarse snapshot, if kept.
     pub coarse_bytes: Option<u64>,
-    /// Sizes it was meshed with again; `None` for those of the first run.
+    /// Sizes of the last time the sub-domain was meshed again; `None` for those of the first run.
     pub sizes: Option<Value>,
 }
 
@@ -198,7 +200,7 @@ impl StoreInfo {
         })
     }
 
-    /// Bytes of the whole store on disk.
+    /// Total bytes of the store on disk.
     pub fn bytes_on_disk(&self) -> u64 {
         self.bytes + self.coarse_bytes + self.previous_bytes + self.catalog_bytes
     }
@@ -274,7 +276,7 @@ fn embedded(catalog: &mut Catalog) -> Result<Vec<EmbeddedInfo>, Error> {
 
 fn regions(catalog: &mut Catalog) -> Result<Vec<RegionInfo>, Error> {
     let (rows, names) = (catalog.regions()?, catalog.region_names()?);
-    // Names are those of regions 1, 2, …, empty for a region without one.
+    // Element i is the name of region i + 1, empty if the region has none.
     let name_of = |row: &RegionRow| names.get((row.region as usize).checked_sub(1)?);
     let info = |row: RegionRow| {
         let name = name_of(&row).filter(|name| !name.is_empty()).cloned();

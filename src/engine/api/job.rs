@@ -1,4 +1,4 @@
-//! What a store has on record of how it was made: options, surface, sizes from a file, the recipe's version.
+//! The job that a store records: options, surface, size file, version of the recipe.
 
 use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
@@ -17,7 +17,7 @@ use tetdb_kernel::sizing::{Background, BackgroundMesh};
 use tetdb_schema::source::Source;
 use tetdb_store::store::Catalog;
 
-/// The record of a run.
+/// Builds the job record of a run.
 #[doc(hidden)]
 pub fn job(options: &MeshOptions, surfaces: &[Source]) -> Job {
     Job {
@@ -27,7 +27,7 @@ pub fn job(options: &MeshOptions, surfaces: &[Source]) -> Job {
     }
 }
 
-/// The options a store was made with. Errors: `damaged`.
+/// The recorded options of a store. Errors: `damaged`.
 #[doc(hidden)]
 pub fn options_of(job: &Job, store: &Path) -> Result<MeshOptions, Error> {
     serde_json::from_str(&job.options).map_err(|e| {
@@ -36,11 +36,11 @@ pub fn options_of(job: &Job, store: &Path) -> Result<MeshOptions, Error> {
     })
 }
 
-/// Whether a job would give the same mesh as these options and surfaces.
+/// Returns whether a job gives the same mesh as these options and surfaces.
 #[doc(hidden)]
 pub fn is_same(job: &Job, options: &MeshOptions, surfaces: &[Source]) -> bool {
     let same = serde_json::from_str::<MeshOptions>(&job.options).is_ok_and(|mut o| {
-        // A store that kept more or less than asked for holds the same mesh.
+        // Kept snapshots and the storage form do not affect the mesh.
         o.drop_coarse = options.drop_coarse;
         o.seal = options.seal;
         o == *options
@@ -49,7 +49,7 @@ pub fn is_same(job: &Job, options: &MeshOptions, surfaces: &[Source]) -> bool {
         && job.surfaces.iter().zip(surfaces).all(|(then, now)| *then == now.to_record())
 }
 
-/// Refuses to go on with a store that another version of the recipe began: the result would be of neither.
+/// Refuses to continue a store that another version of the recipe began, because the result would follow neither version.
 #[doc(hidden)]
 pub fn check_recipe(catalog: &mut Catalog) -> Result<(), Error> {
     let found = recipe_of(catalog)?;
@@ -64,10 +64,10 @@ pub fn check_recipe(catalog: &mut Catalog) -> Result<(), Error> {
     .with_help("go on with the version of tetdb that began it, or mesh again"))
 }
 
-/// Completes the record of the file of sizes: its full path and the hash of its contents.
+/// Completes the record of the size file: its full path and the hash of its contents.
 #[doc(hidden)]
 pub fn identify_sizes(options: &mut MeshOptions) -> Result<(), Error> {
-    // Sizes from arrays have their hash already.
+    // Sizes from arrays already have a hash.
     let Some(file) = options.size_field.as_mut().filter(|file| !is_in_store(&file.path)) else {
         return Ok(());
     };
@@ -78,8 +78,9 @@ pub fn identify_sizes(options: &mut MeshOptions) -> Result<(), Error> {
     Ok(())
 }
 
-/// Adds the seeds of the surface's files to the options, so that the record is complete. Under the rule `seeds` they count like
-/// seeds of the user; under any other rule only their names are taken.
+/// Adds the seeds of the surface's files to the options, so that the record is complete.
+///
+/// Under the rule `seeds` they count like the user's seeds. Under any other rule, only their names are used.
 #[doc(hidden)]
 pub fn take_seeds(options: &mut MeshOptions, seeds: &[Seed]) {
     let is_rule = options.regions.policy == RegionPolicy::Seeds;
@@ -95,9 +96,9 @@ pub fn take_seeds(options: &mut MeshOptions, seeds: &[Seed]) {
     }
 }
 
-/// Reads the sizes of identified options into at most half of `cap`; sizes that were given as arrays are in `store`.
+/// Reads the size file of identified options, in at most half of `cap`. Sizes that were given as arrays are in `store`.
 ///
-/// Errors: `size-field-changed` if the files have other contents than on record.
+/// Errors: `size-field-changed` if the contents of the files differ from the record.
 #[doc(hidden)]
 pub fn read_background(
     options: &MeshOptions,
@@ -128,7 +129,7 @@ pub fn read_background(
     }))
 }
 
-/// Of the sizes and the mesh beside them.
+/// Hash of a size file and of its mesh file, if it has one.
 fn hash(path: &Path) -> Result<String, Error> {
     let (sizes, mesh) = size_files(path)?;
     let mut all = Xxh3::new();

@@ -1,16 +1,17 @@
-//! Where points lie in their tetrahedra.
+//! Points and their barycentric coordinates in the tetrahedra of a mesh.
 
 use super::{Error, Store};
 use tetdb_base::geom::Point;
 use tetdb_store::query::Hit;
 
-/// A tetrahedron, and the shares of its corners in a point.
+/// A tetrahedron, and the barycentric coordinates of a point in it.
 type Located = (Hit, [f64; 4]);
 
 impl Store {
-    /// [`Store::locate`], with the point's barycentric coordinates: of sum 1 but for rounding, and exactly zero on a face.
+    /// Like [`Store::locate`], with the barycentric coordinates of each point. Their sum is 1 up to rounding, and a coordinate is
+    /// exactly zero on a face.
     ///
-    /// Shape: the answer runs parallel to `points`. Errors: damage; too little memory.
+    /// Shape: the result runs parallel to `points`. Errors: damage; too little memory.
     pub fn locate_barycentric(
         &mut self,
         points: &[[f64; 3]],

@@ -1,12 +1,12 @@
-//! How much memory a run may hold, and how much there is.
+//! The memory limit of a run, and the memory that is free.
 
 use std::fmt;
 
 use crate::pipeline::MEMORY_MIN;
 
-/// Share of the free memory that is taken when nothing is asked for.
+/// Share of the free memory that is used if no cap is given.
 const DEFAULT_SHARE: f64 = 0.6;
-/// What is assumed where the system does not say.
+/// Free memory assumed if the system does not report it.
 const UNKNOWN_FREE: u64 = 4 << 30;
 
 /// The smallest cap of any run.
@@ -15,7 +15,7 @@ pub const MEMORY_LEAST: Bytes = Bytes(MEMORY_MIN);
 /// A number of bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Bytes(
-    /// How many.
+    /// The number.
     pub u64,
 );
 
@@ -37,7 +37,7 @@ impl fmt::Display for Bytes {
     }
 }
 
-/// Bytes in the unit a person would use.
+/// Formats bytes with a readable unit.
 #[doc(hidden)]
 pub fn show_bytes(bytes: u64) -> String {
     let b = bytes as f64;
@@ -50,7 +50,7 @@ pub fn show_bytes(bytes: u64) -> String {
     }
 }
 
-/// The cap where none is given, and in words where it comes from.
+/// The default cap, and its origin in words.
 #[doc(hidden)]
 pub fn default_cap() -> (u64, String) {
     let (free, whence) = free();
@@ -59,7 +59,7 @@ pub fn default_cap() -> (u64, String) {
     (bytes.max(MEMORY_MIN), words)
 }
 
-/// Free bytes of the system, of the control group, or of what the process may take, whichever is least.
+/// Free bytes of the system, of the control group, or within the limits of the process, whichever is least.
 fn free() -> (u64, &'static str) {
     let system = field("/proc/meminfo", "MemAvailable:").unwrap_or(UNKNOWN_FREE);
     let of_process = |limit, used| {
@@ -79,17 +79,17 @@ fn free() -> (u64, &'static str) {
     known.min_by_key(|(bytes, _)| *bytes).expect("the first is always known")
 }
 
-/// What a process holds beside its cap: code and stacks.
+/// Bytes of a process that do not count towards its cap: code and stacks.
 const BESIDE_CAP: u64 = 32 << 20;
 
-/// A line of a file of the system that counts in KiB, in bytes.
+/// A value in bytes from a system file whose lines count in KiB.
 fn field(file: &str, name: &str) -> Option<u64> {
     let text = std::fs::read_to_string(file).ok()?;
     let line = text.lines().find(|line| line.starts_with(name))?;
     Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
 }
 
-/// The limit the system enforces on this process; `None` where there is none.
+/// A limit that the system enforces on this process; `None` if there is none.
 fn limit_of(name: &str) -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/limits").ok()?;
     let line = text.lines().find(|line| line.starts_with(name))?;
@@ -121,7 +121,7 @@ fn group_free() -> Option<u64> {
     None
 }
 
-/// The most this process has ever held, in bytes, where the system says.
+/// The most memory this process has ever held, in bytes, if the system reports it.
 pub fn peak_bytes() -> Option<u64> {
     field("/proc/self/status", "VmHWM:")
 }

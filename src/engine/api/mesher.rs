@@ -1,4 +1,4 @@
-//! A new store from a surface.
+//! Meshing a surface into a new store.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -22,20 +22,23 @@ use tetdb_schema::catalog::StoreState;
 use tetdb_store::audit::Level;
 use tetdb_store::store::{Catalog, StoreError, WriterLock};
 
-/// A surface that takes more than this part of the cap is not kept while the mesh is refined.
+/// A surface larger than the cap divided by this number is freed while the mesh is refined.
 const SURFACE_KEPT: u64 = 8;
 
-/// What to do with a store that is already at the path.
+/// Treatment of a store that already exists at the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Existing {
-    /// The finished mesh of the same job is returned as it is; anything else is refused.
+    /// Returns the finished mesh of the same job unchanged; refuses anything else.
     #[default]
     Keep,
-    /// It is replaced, once the new store is finished.
+    /// Replaces the old store once the new one is finished.
     Replace,
 }
 
-/// Meshes a surface into a new store: validated, refused before anything is written, on record, resumable, verified.
+/// Meshes a surface into a new store.
+///
+/// The surface and the options are validated, and a mesh that does not fit is refused, before anything is written. The store records the
+/// job. An interrupted run can be resumed, and the finished mesh is verified.
 ///
 /// ```
 /// # use tetdb_engine::api as tetdb;
@@ -60,15 +63,15 @@ pub struct Mesher {
     verify: bool,
 }
 
-/// What a run left at its path.
+/// Result of a run.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Created {
     /// Path of the store.
     pub path: PathBuf,
-    /// Whether the finished mesh of this job was there already.
+    /// True if the finished mesh of this job was at the path already.
     pub was_there: bool,
-    /// Pages that the run moved; `None` where nothing was meshed.
+    /// Pages that the run moved; `None` if nothing was meshed.
     pub traffic: Option<PageTraffic>,
 }
 
@@ -80,7 +83,7 @@ pub struct PageTraffic {
     pub pages_read: u64,
     /// Pages written.
     pub pages_written: u64,
-    /// Most pages held in memory at once.
+    /// Largest number of pages in memory at once.
     pub frames_used: usize,
 }
 
@@ -95,12 +98,12 @@ impl From<&pipeline::Summary> for PageTraffic {
 }
 
 impl Mesher {
-    /// With the sizes of the surface's own edges and all other defaults.
+    /// Meshes `surface` with the sizes of its own edges and all other options at their defaults.
     pub fn new(surface: Surface) -> Self {
         Self::with_options(surface, MeshOptions::default())
     }
 
-    /// With these options, and default settings.
+    /// Meshes `surface` with these options, and default settings.
     pub fn with_options(surface: Surface, mesh: MeshOptions) -> Self {
         Self {
             surface,
@@ -113,22 +116,22 @@ impl Mesher {
         }
     }
 
-    /// Wanted edge lengths.
+    /// Sets the wanted edge lengths.
     pub fn sizes(mut self, sizes: Sizes) -> Self {
         self.sizes = sizes;
         self
     }
 
-    /// Which regions are filled.
+    /// Sets which regions are filled.
     pub fn regions(mut self, regions: Regions) -> Self {
         self.options.mesh.regions.policy = regions;
         self
     }
 
-    /// The region around `point` is called `name`, and filled under [`Regions::Seeds`]; may be repeated.
+    /// Names the region around `point`, and fills it under [`Regions::Seeds`]. May be repeated.
     ///
-    /// A name is good wherever a region is asked for: sizes, questions, exports. Seeds outside, on a triangle, in a region that stays
-    /// empty, or of two names in one region are refused when the mesh is begun (`bad-seed`).
+    /// The name is valid wherever a region is expected: in sizes, questions and exports. A seed is refused when meshing starts
+    /// (`bad-seed`) if it lies outside, on a triangle or in a region that stays empty. Two names for one region are refused too.
     pub fn region_seed(mut self, point: [f64; 3], name: Option<&str>) -> Self {
         let kind = SeedKind::Region(name.map(str::to_owned));
         let point = Point::from_array(point);
@@ -136,108 +139,108 @@ impl Mesher {
         self
     }
 
-    /// The region around `point` stays empty, whatever the rule; may be repeated.
+    /// Keeps the region around `point` empty, under any rule. May be repeated.
     pub fn hole(mut self, point: [f64; 3]) -> Self {
         let (point, kind) = (Point::from_array(point), SeedKind::Hole);
         self.options.mesh.regions.seeds.push(Seed { point, kind });
         self
     }
 
-    /// Into how many sub-domains the mesh is divided.
+    /// Sets the number of sub-domains.
     pub fn subdomains(mut self, n: Subdomains) -> Self {
         self.options.mesh.subdomains = n;
         self
     }
 
-    /// How far tetrahedra are improved.
+    /// Sets how far the quality of tetrahedra is improved.
     pub fn optimize(mut self, optimize: Optimize) -> Self {
         self.options.mesh.optimize = optimize;
         self
     }
 
-    /// How finished sub-domains are kept.
+    /// Sets how finished sub-domains are stored.
     pub fn seal(mut self, seal: Seal) -> Self {
         self.options.mesh.seal = seal;
         self
     }
 
-    /// Whether what sub-domains are meshed from is kept, so that they can be meshed again. Default: it is.
+    /// Sets whether the coarse snapshots of the sub-domains are kept. Meshing a sub-domain again needs its snapshot. Default: true.
     pub fn keep_coarse(mut self, keep: bool) -> Self {
         self.options.mesh.drop_coarse = !keep;
         self
     }
 
-    /// Whether meshes on the way (before each cut, with its zone refined) are kept to be looked at. Default: they are not.
+    /// Sets whether intermediate meshes are kept for inspection: before each cut, and with its zone refined. Default: false.
     pub fn keep_stages(mut self, keep: bool) -> Self {
         self.options.mesh.keep_stages = keep;
         self
     }
 
-    /// Whether the surface's triangles are divided first until their edges are as short as the wanted lengths. Default: they are not, and
-    /// its edges bound how short those of the mesh can be near it.
+    /// Sets whether the surface's triangles are first divided until their edges are as short as the wanted lengths. Default: false; the
+    /// surface's edges then bound how short edges near it can be.
     ///
-    /// No point of the surface moves. The store keeps a copy of the divided surface, and the mesh is verified against that.
+    /// No point of the surface moves. The store keeps a copy of the divided surface, and the mesh is verified against this copy.
     pub fn refine_surface(mut self, refine: bool) -> Self {
         self.options.mesh.refine_surface = refine;
         self
     }
 
-    /// Whether the run ends with the coarse mesh, and leaves the rest to [`Tasks`](super::Tasks) or [`Store::resume`]. Default: it does not.
+    /// Sets whether the run ends with the coarse mesh. [`Tasks`](super::Tasks) or [`Store::resume`] then do the rest. Default: false.
     pub fn coarse_only(mut self, coarse_only: bool) -> Self {
         self.options.run.coarse_only = coarse_only;
         self
     }
 
-    /// How the run works, all at once.
+    /// Replaces all settings of the run.
     pub fn settings(mut self, settings: Settings) -> Self {
         self.settings = settings;
         self
     }
 
-    /// Caps what the run holds; see [`Settings::memory`].
+    /// Limits the memory of the run; see [`Settings::memory`].
     pub fn memory(mut self, cap: Bytes) -> Self {
         self.settings = self.settings.memory(cap);
         self
     }
 
-    /// Threads of the run; see [`Settings::threads`].
+    /// Sets the number of threads; see [`Settings::threads`].
     pub fn threads(mut self, n: usize) -> Self {
         self.settings = self.settings.threads(n);
         self
     }
 
-    /// The run ends soon after this token is cancelled.
+    /// Ends the run soon after this token is cancelled.
     pub fn cancel(mut self, token: &CancelToken) -> Self {
         self.settings = self.settings.cancel(token);
         self
     }
 
-    /// Is called with each [`Event`]; see [`Settings::progress`].
+    /// Calls `listener` with each [`Event`]; see [`Settings::progress`].
     pub fn progress(mut self, listener: impl Fn(&Event) + Send + Sync + 'static) -> Self {
         self.settings = self.settings.progress(listener);
         self
     }
 
-    /// What becomes of a store that is already there.
+    /// Sets the treatment of a store that already exists at the path.
     pub fn existing(mut self, existing: Existing) -> Self {
         self.existing = existing;
         self
     }
 
-    /// Whether the finished mesh is verified against the surface. Default: it is.
+    /// Sets whether the finished mesh is verified against the surface. Default: true.
     pub fn verify(mut self, verify: bool) -> Self {
         self.verify = verify;
         self
     }
 
-    /// Whether a mesh that memory or disk are not expected to hold is refused. Default: it is.
+    /// Sets whether a mesh is refused if memory or disk are not expected to hold it. Default: true.
     #[doc(hidden)]
     pub fn preflight(mut self, preflight: bool) -> Self {
         self.preflight = preflight;
         self
     }
 
-    /// The options as they go on record: with sizes checked and the seeds of the surface's files. Errors: values without a meaning.
+    /// Completes the options for the record: checks sizes and adds the seeds of the surface's files. Errors: values that make no sense.
     fn complete_options(&self) -> Result<Options, Error> {
         let mut options = self.options.clone();
         let mesh = &mut options.mesh;
@@ -256,12 +259,14 @@ impl Mesher {
         Ok(options)
     }
 
-    /// Predicts the mesh and what it takes; nothing is written. Errors: sizes that make no sense, a surface with defects.
+    /// Predicts the mesh, and the memory, disk and time needed. Nothing is written.
+    ///
+    /// Errors: sizes that make no sense; a surface with defects.
     pub fn predict(&self) -> Result<Prediction, Error> {
         self.predict_at(".")
     }
 
-    /// The same for a store at `store`, whose disk is looked at.
+    /// Like [`Mesher::predict`], for a store at `store`; the free space of its disk is reported.
     pub fn predict_at(&self, store: impl AsRef<Path>) -> Result<Prediction, Error> {
         guarded(&self.settings, || {
             let (cap, store) = (self.settings.cap()?, store.as_ref());
@@ -280,20 +285,22 @@ impl Mesher {
 
     /// Meshes into a new store at `path` and opens it.
     ///
-    /// Errors: a surface with defects, options that make no sense, too little memory or disk are refused before anything is written. A
-    /// run that is cancelled, killed or ends at a full disk leaves a store that [`Store::resume`] goes on with.
+    /// A run that is cancelled, killed or ended by a full disk leaves a store that [`Store::resume`] can continue.
+    ///
+    /// Errors: a surface with defects, options that make no sense, too little memory or disk. All of these are refused before anything
+    /// is written.
     pub fn create(self, path: impl AsRef<Path>) -> Result<Store, Error> {
         let settings = self.settings.clone();
         let created = self.create_reported(path.as_ref())?;
         Store::open_with(created.path, settings)
     }
 
-    /// The same where the store may stay unfinished, see [`Mesher::coarse_only`]. Errors: as [`Mesher::create`].
+    /// Like [`Mesher::create`], for a store that may stay unfinished; see [`Mesher::coarse_only`]. Errors: as [`Mesher::create`].
     pub fn create_unfinished(self, path: impl AsRef<Path>) -> Result<(), Error> {
         self.create_reported(path.as_ref()).map(|_| ())
     }
 
-    /// [`Mesher::create`], and what the run did.
+    /// Like [`Mesher::create`], but returns a report of the run and does not open the store.
     pub fn create_reported(mut self, path: &Path) -> Result<Created, Error> {
         let settings = self.settings.clone();
         guarded(&settings, || self.run(path, &settings))
@@ -319,7 +326,7 @@ impl Mesher {
         }
         let prepared = self.prepare(path, cap, settings)?;
         let (summary, lock) = match self.mesh(path, cap, prepared, settings) {
-            // Another run was faster: what it left decides.
+            // Another run was faster, so the store that it left decides.
             Err(error) if error.code() == Code::StoreExists && self.is_there(path)? => {
                 return Ok(Created { path: path.to_owned(), was_there: true, traffic: None });
             }
@@ -336,7 +343,7 @@ impl Mesher {
         Ok(Created { path: path.to_owned(), was_there: false, traffic: Some((&summary).into()) })
     }
 
-    /// Refuses early what is no store or an unfinished one, before a surface is read for it.
+    /// Refuses a path with an unfinished store, or with files that are no store, before a surface is read for it.
     #[doc(hidden)]
     pub fn check_path(path: &Path, existing: Existing) -> Result<(), Error> {
         if !path.exists() || existing == Existing::Replace {
@@ -355,7 +362,7 @@ impl Mesher {
         }
     }
 
-    /// Whether the finished mesh of this job is at `path` already. Errors: something is in the way.
+    /// Returns whether the finished mesh of this job is at `path` already. Errors: the path holds something else.
     fn is_there(&self, path: &Path) -> Result<bool, Error> {
         if !path.exists() {
             return Ok(false);
@@ -376,7 +383,7 @@ impl Mesher {
         }
     }
 
-    /// Divides the triangles of the surface, once it is known to have no defects.
+    /// Validates the surface, then divides its triangles.
     fn divide_surface(&mut self, path: &Path, cap: u64, settings: &Settings) -> Result<(), Error> {
         let scratch = scratch_beside(&self.surface.inner, cap, path)?;
         attempt(|| surface::validate_with(&self.surface.inner, &scratch))?.accept()?;
@@ -384,7 +391,7 @@ impl Mesher {
         divide(&mut self.surface, &self.options, field, cap, path, settings)
     }
 
-    /// Validates, builds the size field and looks whether everything fits; inserts vertices meanwhile.
+    /// Validates the surface, builds the size field and checks that the mesh fits. Vertices are inserted at the same time.
     fn prepare(
         &self,
         path: &Path,
@@ -420,7 +427,8 @@ impl Mesher {
         })
     }
 
-    /// Everything from the first commit to the last. Returns the lock as well: nobody changes the store before it is verified.
+    /// Runs all steps from the first commit to the last. Returns the writer lock too, so that nobody changes the store before it is
+    /// verified.
     fn mesh(
         &mut self,
         path: &Path,
@@ -428,7 +436,7 @@ impl Mesher {
         prepared: (Prepared, Option<pipeline::HeadStart>),
         settings: &Settings,
     ) -> Result<(pipeline::Summary, Arc<WriterLock>), Error> {
-        // The old store is only replaced once the new one is sealed.
+        // The old store is replaced only once the new one is sealed.
         let replaces =
             self.existing == Existing::Replace && path.exists() && !Catalog::is_vacant(path);
         let place = match replaces {
@@ -450,7 +458,7 @@ impl Mesher {
             pipeline::mesh(&mut catalog, &surface, options, &budget, &watch)
         };
         let summary = match made.map_err(Error::from) {
-            // A refused surface or option leaves nothing to resume.
+            // After a refused surface or option there is nothing to resume.
             Err(error) if matches!(error.exit_code(), 2 | 3) => {
                 drop(catalog);
                 replace::remove(&place)?;
@@ -465,7 +473,7 @@ impl Mesher {
         Ok((summary, lock))
     }
 
-    /// The catalog of the new store, or of the same replacement that was begun before.
+    /// Creates the catalog of the new store, or opens that of a begun replacement with the same job.
     fn begin(
         &self,
         path: &Path,
@@ -491,7 +499,7 @@ impl Mesher {
     }
 }
 
-/// What is worth knowing of a run.
+/// Reports notes and size warnings of a run to the listener.
 pub(super) fn report(summary: &pipeline::Summary, settings: &Settings) {
     if let Some(asked) = summary.subdomains_asked {
         settings.note(format!(
@@ -507,7 +515,7 @@ pub(super) fn report(summary: &pipeline::Summary, settings: &Settings) {
     }
 }
 
-/// Divides the triangles of a surface without defects to the lengths that `options` want.
+/// Divides the triangles of a surface without defects to the lengths that `options` require.
 #[doc(hidden)]
 pub fn divide(
     surface: &mut Surface,
@@ -531,7 +539,7 @@ pub fn divide(
     Ok(())
 }
 
-/// The size field of a surface and what it predicts, within `cap`; what was given as arrays is read from `store`.
+/// Computes the size field of a surface and predicts the mesh, within `cap`. Sizes that were given as arrays are read from `store`.
 #[doc(hidden)]
 pub fn predict(
     surface: &surface::Surface,
@@ -542,7 +550,7 @@ pub fn predict(
     predict_with(surface, options, None, cap, store)
 }
 
-/// The same, with what was given as arrays and is in no store yet.
+/// Like [`predict`], with sizes given as arrays that are in no store yet.
 fn predict_with(
     surface: &surface::Surface,
     options: &Options,
@@ -558,7 +566,7 @@ fn predict_with(
     Ok(pipeline::prepare(surface, options, background.as_ref(), &scratch)?)
 }
 
-/// The surface for the pipeline: given away when it is large against the cap, to be read again for verification.
+/// Passes the surface to the pipeline. A surface that is large against the cap is moved, and read again for verification.
 pub(super) fn lent_or_given(surface: &mut surface::Surface, cap: u64) -> Cow<'_, surface::Surface> {
     match surface.bytes() as u64 > cap / SURFACE_KEPT {
         true => Cow::Owned(std::mem::take(surface)),
@@ -566,7 +574,7 @@ pub(super) fn lent_or_given(surface: &mut surface::Surface, cap: u64) -> Cow<'_,
     }
 }
 
-/// Verifies a mesh against its surface, which is read again where it is not at hand, and puts on record that it was.
+/// Verifies a mesh against its surface and records the verification. Without `surface`, the surface is read again.
 pub(super) fn verify_new(
     path: &Path,
     surface: Option<&surface::Surface>,

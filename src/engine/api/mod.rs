@@ -1,10 +1,27 @@
-//! The front door: whoever calls it gets validation, refusal before anything is written, the job on record, verification and resume.
+//! The front door: all public calls of the library.
 //!
-//! Reading order: `surface`, `sizes` and `options` (what is asked for), `settings` (memory, threads, cancelling, progress), `mesher`
-//! (a new store), `store` (a finished one), `ask` (questions), `remesh` (sub-domains again), `tasks` (many
-//! machines), `show` (files, pictures, the page),
-//! `error`. Private: `job` (what is put on record), `preflight` (what is refused before it begins), `replace` (one store in the place of
-//! another), `guard` (nothing unwinds into the caller).
+//! A call that creates a mesh validates its input and refuses a mesh that does not fit before anything is written. The store records the
+//! job, so an interrupted run can be resumed. The finished mesh is verified. Failures are returned as [`Error`]; no call unwinds into
+//! its caller.
+//!
+//! Reading order:
+//!
+//! | modules | subject |
+//! |---|---|
+//! | `surface`, `surface_arrays`, `surface_wires` | the input surface; embedded sheets, edges and points |
+//! | `surface_limits`, `surface_repair`, `defects`, `surface_report`, `suggestions` | calls within a memory limit; repairs; reports |
+//! | `sizes`, `field_arrays`, `options` | wanted edge lengths and other options of a mesh |
+//! | `settings`, `memory` | memory, threads, cancelling, progress |
+//! | `mesher`, `prediction`, `resume` | a new store; predictions; interrupted runs |
+//! | `store`, `info`, `names`, `located`, `compare` | a finished store; records; names; points in tetrahedra; two meshes compared |
+//! | `verify`, `verify_shared`, `verify_server` | verification, by one or several processes |
+//! | `ask`, `condition`, `answer_rows`, `answer_file` | questions and their answers |
+//! | `remesh`, `remesh_sizes` | meshing sub-domains again |
+//! | `tasks`, `tasks_status` | one mesh by the tasks of a batch scheduler |
+//! | `mpi` | one mesh by the ranks of an MPI program |
+//! | `show`, `picture`, `page`, `targets` | files for other programs, pictures, the page; protection of input files |
+//! | `error`, `from_errors` | errors |
+//! | `job`, `preflight`, `replace`, `guard` | internal: the job record; early refusals; replacing a store; the end of unwinding |
 
 mod answer_file;
 mod answer_rows;

@@ -1,15 +1,15 @@
-//! Regions and labels of a store by their names.
+//! Regions and labels of a store by name.
 
 use super::{Error, Summary};
 use tetdb_store::query::{QueryError, regions_called};
 
 impl Summary {
-    /// Numbers of the regions called `name`. Errors: `no-such-part`.
+    /// Numbers of the regions named `name`. Errors: `no-such-part`.
     pub fn regions_called(&self, name: &str) -> Result<Vec<u32>, Error> {
         Ok(regions_called(&self.region_names, name)?)
     }
 
-    /// The number of the label called `name`; where no label has this name, `name` is read as a number.
+    /// Number of the label named `name`. If no label has this name, `name` is parsed as a number.
     ///
     /// Errors: `no-such-part`.
     pub fn label_called(&self, name: &str) -> Result<u32, Error> {

@@ -1,4 +1,4 @@
-//! What shapes a mesh, besides its sizes.
+//! Options of a mesh other than its sizes.
 
 pub use crate::pipeline::Subdomains;
 pub use tetdb_kernel::boundary::RegionPolicy as Regions;
@@ -9,10 +9,10 @@ pub use tetdb_store::sealed::Form as Seal;
 use super::{Error, job};
 use crate::pipeline::{MeshOptions, OptionsText};
 
-/// Parses options that were given as text, and looks at the file of sizes.
+/// Parses options given as text, and reads the size file to record its hash.
 ///
 /// # Errors
-/// The option and the value that have no meaning; `unreadable-file`.
+/// An option whose value makes no sense, with the value; `unreadable-file`.
 pub fn typed(text: OptionsText) -> Result<MeshOptions, Error> {
     let mut options = MeshOptions::try_from(text)?;
     job::identify_sizes(&mut options)?;

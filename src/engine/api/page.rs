@@ -1,4 +1,4 @@
-//! A page about a mesh, to be opened in a browser.
+//! A page about a mesh, for a web browser.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,12 +19,12 @@ use tetdb_schema::catalog::{JournalRow, QUALITY_BINS};
 use tetdb_store::query::QuerySession;
 use tetdb_store::store::Catalog;
 
-/// Qualities from here on have the last color, as in pictures.
+/// Qualities from this value on have the last color, as in pictures.
 const QUALITY_MOST: f32 = 3.0;
-/// Regions whose labels are named.
+/// Largest number of labels listed for a region.
 const LABELS_NAMED: usize = 24;
 
-/// A page that was written.
+/// Counts of a written page.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[non_exhaustive]
 pub struct Reported {
@@ -34,11 +34,11 @@ pub struct Reported {
     pub boundary: ShownTriangles,
     /// Triangles between sub-domains.
     pub interfaces: ShownTriangles,
-    /// Chunks that were read for the page.
+    /// Chunks read for the page.
     pub chunks: ChunkCounts,
 }
 
-/// How much of a surface a page shows: large surfaces are coarsened.
+/// Number of triangles shown of a surface. Large surfaces are coarsened.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ShownTriangles {
     /// Triangles of the surface.
@@ -55,7 +55,7 @@ impl ShownTriangles {
 }
 
 impl Store {
-    /// Writes a page about the mesh, to be opened in a browser: numbers, charts, surfaces to be turned, cuts. `.html`.
+    /// Writes an `.html` page about the mesh for a web browser: numbers, charts, surfaces that can be turned, cuts.
     ///
     /// Errors: `unknown-format`; damage; the disk.
     pub fn report(&self, out: impl AsRef<Path>) -> Result<Reported, Error> {
@@ -77,7 +77,7 @@ fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result<Reported, 
     let mut store = open_finished(path)?;
     let title = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut data = of_catalog(path, &mut store, &title)?;
-    // Text and tables of the page have the rest.
+    // The remaining memory is for text and tables of the page.
     let (mut session, budget) =
         (QuerySession::open(store, &Budget::new(cap / 2))?, Budget::new(cap / 8 * 3));
     attempt(|| -> Result<Reported, Error> {
@@ -100,7 +100,7 @@ fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result<Reported, 
 }
 
 impl Store {
-    /// Quality of all tetrahedra over the least that the surface allows. Reads the whole mesh.
+    /// Computes the excess of all tetrahedra: their quality over the least that the surface allows. Reads the whole mesh.
     ///
     /// # Errors
     /// Damage; too little memory.
@@ -116,7 +116,7 @@ impl Store {
     }
 }
 
-/// What the catalog has on record.
+/// Data of the page from the catalog.
 fn of_catalog(path: &Path, catalog: &mut Catalog, title: &str) -> Result<Value, Error> {
     let (state, job, labels) = (catalog.state()?, catalog.job()?, catalog.labels()?);
     let (rows, journal, topology) =
@@ -173,7 +173,7 @@ fn of_catalog(path: &Path, catalog: &mut Catalog, title: &str) -> Result<Value, 
     }))
 }
 
-/// Tetrahedra that the load of each sub-domain made expect.
+/// Predicted tetrahedra of each sub-domain, by rank.
 fn predictions(journal: &[JournalRow]) -> BTreeMap<u32, f64> {
     let mut predicted = BTreeMap::new();
     for row in journal.iter().filter(|r| r.step.contains("seal")) {
@@ -185,7 +185,7 @@ fn predictions(journal: &[JournalRow]) -> BTreeMap<u32, f64> {
     predicted
 }
 
-/// Steps of one kind together, so that names are written once: of each its place, its seconds, its measures.
+/// Groups the steps by kind, so that names are written once. Each step has its position, its seconds and its measures.
 fn steps(journal: &[JournalRow]) -> Value {
     let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
     for row in journal {
@@ -217,7 +217,7 @@ fn steps(journal: &[JournalRow]) -> Value {
     kinds.collect()
 }
 
-/// Adds all surfaces to the page; returns what the page says of them.
+/// Adds all surfaces to the page. Returns their description for the page.
 fn surfaces(
     (session, budget): (&mut QuerySession, &Budget),
     page: &mut Page,
@@ -251,7 +251,7 @@ fn surfaces(
     }
     let extent = bounds.high - bounds.low;
     let least = extent.to_array().into_iter().enumerate();
-    // The cut seen first is across the shortest side, for it shows most; seen from the low side of y.
+    // The first cut shown is across the shortest side, because it shows most. Along y it is seen from the low side.
     let axis = least.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(1, |(axis, _)| axis);
     Ok(json!({
         "low": bounds.low.to_array(), "high": bounds.high.to_array(), "axis": axis, "quality": [1.0, QUALITY_MOST],
@@ -271,7 +271,7 @@ fn shown<T>(patch: &Patch<T>) -> Value {
     json!({ "of": patch.of, "shown": patch.triangles.len(), "joined": patch.cell })
 }
 
-/// Sub-domain, region, quality and size as a byte each, a bit for each edge that is drawn.
+/// Values for each triangle of a cut: sub-domain, region, quality and size as one byte each, and one bit for each drawn edge.
 fn of_cut(cut: &SceneCut, statistics: &Statistics) -> [Vec<u32>; 5] {
     let byte = |x: f64, [least, most]: [f64; 2]| {
         let share = (x - least) / (most - least).max(f64::MIN_POSITIVE);

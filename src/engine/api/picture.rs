@@ -1,4 +1,4 @@
-//! Pictures of a mesh: cuts through it, surfaces in space.
+//! Pictures of a mesh: cuts through it, and surfaces in space.
 
 use std::path::Path;
 use tetdb_schema::code::Code;
@@ -15,16 +15,16 @@ use tetdb_base::storage::{Budget, attempt};
 use tetdb_schema::catalog::Stage;
 use tetdb_store::query::{QuerySession, Selection};
 
-/// Qualities from here on have the last color: few are worse, and the others should differ.
+/// Qualities from this value on have the last color. Few are worse, and the others should remain distinguishable.
 const QUALITY_MOST: f32 = 3.0;
-/// What has no label.
+/// Color of pieces without a label.
 const INSIDE: Rgb = Rgb([205, 205, 210]);
-/// Bytes of a pixel while it is drawn, with its height, and again while it is compressed.
+/// Bytes for a pixel: while it is drawn, with its height, and again while it is compressed.
 const PIXEL_BYTES: u64 = 16;
-/// Towards the viewer of surfaces in space: a little from the right, a little from above.
+/// Direction towards the viewer of surfaces in space: slightly from the right and from above.
 const FROM: Point = Point::new(0.55, -1.0, 0.5);
 
-/// What colors stand for.
+/// Quantity that colors stand for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColorBy {
     /// The sub-domain.
@@ -32,11 +32,11 @@ pub enum ColorBy {
     Subdomain,
     /// The region.
     Region,
-    /// q from 1 to 3; not of surfaces.
+    /// Quality q from 1 to 3; not for surfaces.
     Quality,
     /// The mean edge length.
     Size,
-    /// The label of input triangles, in space; tetrahedra are gray.
+    /// The label of input triangles, in space. Tetrahedra are gray.
     Label,
 }
 
@@ -50,17 +50,17 @@ impl Word for ColorBy {
     ];
 }
 
-/// What is drawn.
+/// Subject of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Subject {
     /// The tetrahedra at a plane.
     Cut,
-    /// The same of a mesh that was kept on its way.
+    /// The tetrahedra at a plane, of a kept intermediate mesh.
     Stage(u32, Stage),
     Surface(ShellView),
 }
 
-/// A picture to be taken with [`Store::snapshot`]; `.png` or `.svg`.
+/// Description of a picture for [`Store::snapshot`]; `.png` or `.svg`.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     subject: Subject,
@@ -72,7 +72,7 @@ pub struct Snapshot {
     crinkle: bool,
 }
 
-/// A picture that was taken.
+/// Counts of a written picture.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct Snapped {
@@ -80,11 +80,11 @@ pub struct Snapped {
     pub bytes: u64,
     /// Polygons drawn.
     pub pieces: u64,
-    /// Least and greatest quality among them.
+    /// Least and greatest quality of the drawn polygons' tetrahedra.
     pub quality: [f32; 2],
     /// Least and greatest mean edge length.
     pub size: [f32; 2],
-    /// What was read for it.
+    /// Chunks read for the picture.
     pub chunks: ChunkCounts,
 }
 
@@ -101,12 +101,12 @@ impl Snapshot {
         }
     }
 
-    /// A cut through the mesh; without [`Snapshot::plane`] through its middle, across its least extent.
+    /// A cut through the mesh. Default plane: through the middle of the mesh, across its least extent; see [`Snapshot::plane`].
     pub fn cut() -> Self {
         Self::of(Subject::Cut)
     }
 
-    /// A cut through a mesh that was kept on its way: before a bisection, or with its zone refined.
+    /// A cut through a kept intermediate mesh: before a bisection, or with its zone refined.
     pub fn stage(cut: u32, refined: bool) -> Self {
         let stage = match refined {
             true => Stage::Refined,
@@ -120,12 +120,12 @@ impl Snapshot {
         Self::of(Subject::Surface(ShellView::Boundary))
     }
 
-    /// All that bounds a sub-domain, in space.
+    /// The whole boundary of a sub-domain, in space.
     pub fn shell(rank: u32) -> Self {
         Self::of(Subject::Surface(ShellView::Subdomain(rank)))
     }
 
-    /// The interface of a cut whose stages were kept: as it was chosen, or as the plane alone would give it.
+    /// The interface of a cut with kept stages: as it was chosen, or as the plane alone would give it.
     pub fn interface(cut: u32, chosen: bool) -> Self {
         Self::of(Subject::Surface(match chosen {
             true => ShellView::Chosen(cut),
@@ -133,48 +133,48 @@ impl Snapshot {
         }))
     }
 
-    /// The plane of a cut, through `point`, with its normal towards the viewer; what is drawn in space is cut away beyond it.
+    /// Sets the plane of a cut through `point`, with its normal towards the viewer. A picture in space is cut away beyond this plane.
     pub fn plane(mut self, point: [f64; 3], normal: [f64; 3]) -> Self {
         self.plane = Some([point, normal].map(Point::from_array));
         self
     }
 
-    /// Where what is drawn in space is seen from: a direction towards the viewer.
+    /// Sets the direction towards the viewer of a picture in space.
     pub fn seen_from(mut self, direction: [f64; 3]) -> Self {
         self.from = Some(Point::from_array(direction));
         self
     }
 
-    /// What colors stand for. Default: sub-domains.
+    /// Sets the quantity that colors stand for. Default: sub-domains.
     pub fn color(mut self, by: ColorBy) -> Self {
         self.color = by;
         self
     }
 
-    /// Width and height in pixels. Default: 1600 by 1200.
+    /// Sets width and height in pixels. Default: 1600 by 1200.
     pub fn pixels(mut self, width: u32, height: u32) -> Self {
         self.pixels = [width, height];
         self
     }
 
-    /// Only tetrahedra that a condition holds of; see [`Query::where_`](super::Query::where_). Errors: `bad-expression`.
+    /// Draws only tetrahedra that fulfill a condition; see [`Query::where_`](super::Query::where_). Errors: `bad-expression`.
     pub fn where_(self, condition: &str) -> Result<Self, Error> {
         Ok(self.condition(Condition::parse_located(condition)?))
     }
 
-    /// Only tetrahedra that the condition holds of; see [`Snapshot::where_`].
+    /// Draws only tetrahedra that fulfill the condition; see [`Snapshot::where_`].
     pub fn condition(mut self, condition: Condition) -> Self {
         self.condition = Some(condition);
         self
     }
 
-    /// Draws the cut tetrahedra whole, instead of the polygons they have in common with the plane.
+    /// Draws the cut tetrahedra whole, instead of their intersections with the plane.
     pub fn crinkle(mut self) -> Self {
         self.crinkle = true;
         self
     }
 
-    /// Errors: what has no meaning together.
+    /// Checks the description. Errors: options that exclude each other.
     fn check(&self) -> Result<(), Error> {
         let bad = |message: &str| Err(Error::new(Code::BadQuery, message));
         let in_space = matches!(self.subject, Subject::Surface(_));
@@ -200,7 +200,7 @@ impl Snapshot {
 }
 
 impl Store {
-    /// Takes a picture into the file `out`, `.png` or `.svg`.
+    /// Writes a picture to the file `out`, `.png` or `.svg`.
     ///
     /// Errors: `unknown-format`, `bad-query`, `no-such-part`; damage; the disk.
     pub fn snapshot(&self, out: impl AsRef<Path>, snapshot: &Snapshot) -> Result<Snapped, Error> {
@@ -211,7 +211,7 @@ impl Store {
     }
 }
 
-/// Takes a picture of the store at `path`.
+/// Writes a picture of the store at `path`.
 fn take(
     path: &Path,
     out: &Path,
@@ -224,7 +224,7 @@ fn take(
         u64::from(pixels[0]) * u64::from(pixels[1]) * PIXEL_BYTES,
         "the pixels of the picture",
     )?;
-    // The session takes three quarters of what it is given.
+    // The session uses three quarters of the budget given to it.
     let share = Budget::new(budget.available() * 3 / 4);
     let store = open_finished(path)?;
     let mut session = match snapshot.subject {
@@ -270,7 +270,7 @@ impl Snapshot {
     }
 }
 
-/// All that is drawn, and how it is seen.
+/// The pieces to draw, and the view of them.
 fn pieces(
     snapshot: &Snapshot,
     session: &mut QuerySession,
@@ -284,7 +284,7 @@ fn pieces(
         let from = match snapshot.from {
             Some(from) => from,
             None => match shell {
-                // An interface is nearly flat: it is seen from the side it faces, at a slant.
+                // An interface is nearly flat. It is seen from the side it faces, at a slant.
                 ShellView::Natural(cut) | ShellView::Chosen(cut) => {
                     slanted(view::normal_of(session, cut)?)
                 }
@@ -296,7 +296,7 @@ fn pieces(
     }
     let middle = (bounds.low + bounds.high) * 0.5;
     let [point, normal] = plane.unwrap_or_else(|| match session.cutting() {
-        // Across the plane of the cut, as upright as can be.
+        // Across the plane of the cut, as upright as possible.
         Some([on, normal]) => {
             let middle = middle - normal * normal.dot(middle - on);
             let upright = if normal.z.abs() > 0.9 { Point::Y } else { Point::Z };
@@ -326,7 +326,7 @@ fn draw(
         ColorBy::Quality | ColorBy::Size => {}
     }
     let color = color(snapshot.color, extent, piece);
-    // Faces seen from the side get less light; what is seen from behind is the inside.
+    // Faces seen at an angle get less light. Faces seen from behind are inside faces and have another color.
     let flat =
         matches!(snapshot.subject, Subject::Surface(ShellView::Natural(_) | ShellView::Chosen(_)));
     let color = if piece.facing >= 0.0 || flat {
@@ -344,7 +344,7 @@ fn draw(
     Ok(())
 }
 
-/// Whether colors stand for several kinds.
+/// Returns whether colors stand for several kinds.
 fn are_many(by: ColorBy, subject: Subject, session: &QuerySession) -> bool {
     match by {
         _ if !matches!(
@@ -360,7 +360,7 @@ fn are_many(by: ColorBy, subject: Subject, session: &QuerySession) -> bool {
     }
 }
 
-/// A direction near `normal`, from the half that is seen from in other pictures.
+/// A direction near `normal`, on the side from which other pictures are seen.
 fn slanted(normal: Point) -> Point {
     let normal = if normal.dot(FROM) < 0.0 { -normal } else { normal };
     normal + FROM.normalize() * 0.7

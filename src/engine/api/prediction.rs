@@ -1,4 +1,4 @@
-//! What to expect of a mesh before it is begun.
+//! Predictions about a mesh before it is created.
 
 use std::path::Path;
 
@@ -7,52 +7,52 @@ use super::preflight::free_at;
 use crate::pipeline::{Estimate, Prepared};
 use tetdb_kernel::sizing::SizeSummary;
 
-/// The mesh that surface and sizes predict, and what a run takes.
+/// The predicted mesh, and the memory, disk and time that a run needs for it.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Prediction {
-    /// Tetrahedra.
+    /// Predicted number of tetrahedra.
     pub tets: f64,
-    /// Vertices.
+    /// Predicted number of vertices.
     pub vertices: f64,
-    /// Triangles of the surface.
+    /// Number of triangles of the surface.
     pub triangles: u64,
-    /// Sub-domains.
+    /// Number of sub-domains.
     pub subdomains: u32,
-    /// Where the sizes come from, and their range.
+    /// Origin and range of the sizes.
     pub sizes: SizeSummary,
     /// Bytes of the finished store.
     pub store: Bytes,
-    /// Most bytes on disk while it is meshed.
+    /// Largest number of bytes on disk during the run.
     pub disk_peak: Bytes,
-    /// Bytes free on the disk of the store, where the system says.
+    /// Bytes free on the disk of the store, if the system reports them.
     pub disk_free: Option<Bytes>,
     /// Bytes of memory that the run holds.
     pub memory: Bytes,
-    /// The smallest cap that would do.
+    /// The smallest cap that suffices.
     pub memory_least: Bytes,
-    /// A larger cap than this gains nothing.
+    /// The cap beyond which more memory gains nothing.
     pub memory_full: Bytes,
-    /// Whether the cap is large enough.
+    /// True if the cap is large enough.
     pub fits_memory: bool,
-    /// Seconds on a server of 2.6 GHz.
+    /// Predicted time in seconds, on a server of 2.6 GHz.
     pub seconds: f64,
     estimate: Estimate,
 }
 
-/// Wall seconds of workers on any number of machines, with a thread each.
+/// Predicted wall time of workers on any number of machines, with one thread each. Unit: seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct WorkersPrediction {
-    /// All of it.
+    /// The whole run.
     pub wall_s: f64,
-    /// Before the cuts and after the sub-domains, in one process.
+    /// Work before the cuts and after the sub-domains, in one process.
     pub serial_s: f64,
-    /// The cuts.
+    /// All cuts.
     pub cuts_s: f64,
-    /// The sub-domains.
+    /// All sub-domains.
     pub subdomains_s: f64,
-    /// Wall seconds that no number of workers falls below.
+    /// Lower bound for any number of workers.
     pub wall_least_s: f64,
 }
 
@@ -77,12 +77,12 @@ impl Prediction {
         }
     }
 
-    /// Whether the disk has room for the run, as far as the system says.
+    /// Returns whether the disk has enough free space. True if the system does not report it.
     pub fn fits_disk(&self) -> bool {
         self.disk_free.is_none_or(|free| free >= self.disk_peak)
     }
 
-    /// Seconds of `workers`, of any number of machines; 0 counts as 1.
+    /// Predicts the wall time with `workers` workers on any number of machines; 0 counts as 1.
     pub fn workers(&self, workers: u32) -> WorkersPrediction {
         let forecast = self.estimate.forecast(workers);
         WorkersPrediction {

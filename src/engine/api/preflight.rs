@@ -1,4 +1,4 @@
-//! What is refused before anything is written: too little memory, too little disk.
+//! Refusals before anything is written: too little memory, too little disk.
 
 use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
@@ -10,10 +10,10 @@ use tetdb_base::geom::short;
 use tetdb_base::storage::{ScratchSpace, available_bytes, n_threads};
 use tetdb_base::surface::Surface;
 
-/// A mesh is refused when less than this share of the disk it is expected to take is free: predictions may be that far off.
+/// A mesh is refused if less than this share of its predicted disk space is free. Predictions may be off by that much.
 const REFUSED_BELOW: f64 = 0.7;
 
-/// What a cap leaves beside a surface, with scratch files where the store is or will be.
+/// The part of `cap` that a surface leaves free, with scratch files in the folder that holds the store.
 #[doc(hidden)]
 pub fn scratch_beside(surface: &Surface, cap: u64, store: &Path) -> Result<ScratchSpace, Error> {
     let folder = folder_of(store)
@@ -21,7 +21,7 @@ pub fn scratch_beside(surface: &Surface, cap: u64, store: &Path) -> Result<Scrat
     Ok(ScratchSpace::new(cap.saturating_sub(surface.bytes() as u64), &folder))
 }
 
-/// Refuses a surface that leaves too little of the cap, before anything is done with it.
+/// Refuses a surface that leaves too little of `cap`, before any work on it.
 #[doc(hidden)]
 pub fn surface_fits(surface: &Surface, cap: u64) -> Result<(), Error> {
     let least = pipeline::least_for(surface);
@@ -79,7 +79,8 @@ pub fn preflight(
     Ok(())
 }
 
-/// Says of a full disk what is missing: what is free, and what a run that is expected to need `needed` bytes in all still lacks.
+/// Adds the free disk space to an error of a full disk. With `needed`, the predicted bytes of the whole run, also adds the bytes
+/// missing.
 #[doc(hidden)]
 pub fn with_free_space(mut error: Error, store: &Path, needed: Option<u64>) -> Error {
     if let (Code::DiskFull, Some(free)) = (error.code(), free_at(store)) {
@@ -92,7 +93,7 @@ pub fn with_free_space(mut error: Error, store: &Path, needed: Option<u64>) -> E
     error
 }
 
-/// Bytes that files in a folder take up, where the system says; else their lengths.
+/// Bytes that the files in a folder occupy on disk, if the system reports them; otherwise their lengths.
 fn bytes_on_disk(dir: &Path) -> u64 {
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let bytes = entries.map(|entry| match entry.metadata() {
@@ -106,14 +107,14 @@ fn bytes_on_disk(dir: &Path) -> u64 {
     bytes.sum()
 }
 
-/// The nearest folder that exists.
+/// The nearest existing folder above a store.
 fn folder_of(store: &Path) -> Option<PathBuf> {
     let absolute = std::path::absolute(store).ok()?;
     let above = absolute.ancestors().skip(usize::from(store != Path::new(".")));
     above.into_iter().find(|folder| folder.is_dir()).map(Path::to_owned)
 }
 
-/// Bytes free where a store would be.
+/// Free bytes on the disk of a store.
 #[doc(hidden)]
 pub fn free_at(store: &Path) -> Option<u64> {
     available_bytes(&folder_of(store)?)

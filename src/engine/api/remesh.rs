@@ -1,4 +1,4 @@
-//! Sub-domains of a finished store meshed again; what lies around them stays as it is.
+//! Meshing sub-domains of a finished store again. All other sub-domains stay unchanged.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use tetdb_schema::catalog::SubdomainRow;
 use tetdb_store::audit::Level;
 use tetdb_store::store::{Catalog, StoreError, WriterLock};
 
-/// What is to be meshed again, and how; begun by [`Store::remesh`].
+/// A request to mesh sub-domains again; see [`Store::remesh`].
 ///
 /// ```
 /// # use tetdb_engine::api as tetdb;
@@ -39,28 +39,28 @@ pub struct Remesh {
     verify: bool,
 }
 
-/// Sub-domains to be meshed again.
+/// The sub-domains to mesh again.
 #[derive(Clone, Debug)]
 enum RemeshRanks {
     Listed(BTreeSet<u32>),
-    /// Those whose lengths would differ.
+    /// The sub-domains whose lengths would change.
     Changed,
 }
 
-/// What was meshed again.
+/// Result of meshing sub-domains again, or of undoing it.
 #[non_exhaustive]
 pub struct Remeshed {
-    /// The store as it is now.
+    /// The store after the change.
     pub store: Store,
-    /// Each sub-domain before and after, by rank.
+    /// Each changed sub-domain before and after, by rank.
     pub subdomains: Vec<[SubdomainRow; 2]>,
-    /// Vertices inserted into each of them, parallel to `subdomains`; `None` where an older version came back.
+    /// Number of vertices inserted into each sub-domain; `None` for a restored older version. Shape: parallel to `subdomains`.
     pub inserted_vertices: Vec<Option<u64>>,
     /// Pages read from scratch files.
     pub pages_read: u64,
     /// Pages written to scratch files.
     pub pages_written: u64,
-    /// Most pages held in memory at once.
+    /// Largest number of pages in memory at once.
     pub frames_used: usize,
 }
 
@@ -69,25 +69,25 @@ pub struct Remeshed {
 pub struct RemeshForecast {
     /// Rank of the sub-domain.
     pub id: u32,
-    /// Tetrahedra it has now.
+    /// Number of its tetrahedra now.
     pub tets: u64,
-    /// Tetrahedra to expect.
+    /// Predicted number of its tetrahedra afterwards.
     pub predicted_tets: f64,
 }
 
 impl Store {
-    /// Sub-domains of it again, with other sizes or because they are damaged.
+    /// Starts a request to mesh sub-domains again, with other sizes or because they are damaged.
     pub fn remesh(self) -> Remesh {
         let (path, settings) = self.into_parts();
         Remesh::new(path, settings)
     }
 
-    /// Brings back what the last [`Store::remesh`] replaced. Errors: `nothing-to-undo`.
+    /// Restores the sub-domains that the last [`Store::remesh`] replaced. Errors: `nothing-to-undo`.
     pub fn undo(self) -> Result<Self, Error> {
         Ok(self.undo_reported(false)?.store)
     }
 
-    /// [`Store::undo`], with what came back; the mesh is also verified if `verify` is true. Errors: as there; `invalid-mesh`.
+    /// Like [`Store::undo`], with a report. Also verifies the mesh if `verify` is true. Errors: as [`Store::undo`]; `invalid-mesh`.
     pub fn undo_reported(self, verify: bool) -> Result<Remeshed, Error> {
         let (path, settings) = self.into_parts();
         let summary = guarded(&settings, || {
@@ -103,7 +103,8 @@ impl Store {
         Remeshed::new(Self::open_with(path, settings)?, summary)
     }
 
-    /// Drops what the last [`Store::remesh`] replaced, which cannot be undone then. Returns the number of sub-domains.
+    /// Deletes the previous versions that the last [`Store::remesh`] kept, so that it cannot be undone. Returns the number of
+    /// sub-domains.
     pub fn forget_previous(&mut self) -> Result<usize, Error> {
         self.close_session();
         guarded(self.settings(), || {
@@ -116,7 +117,7 @@ impl Store {
 }
 
 impl Remesh {
-    /// Of the store at `path`, which is opened when the run begins.
+    /// A request for the store at `path`. The store is opened when the run begins.
     pub fn new(path: impl AsRef<Path>, settings: Settings) -> Self {
         Self {
             path: path.as_ref().to_owned(),
@@ -128,66 +129,68 @@ impl Remesh {
         }
     }
 
-    /// Which sub-domains, by rank.
+    /// Selects the sub-domains to mesh again, by rank.
     pub fn subdomains(mut self, ranks: &[u32]) -> Self {
         self.ranks = RemeshRanks::Listed(ranks.iter().copied().collect());
         self
     }
 
-    /// The sub-domains whose lengths would differ by 5 % somewhere.
+    /// Selects the sub-domains whose lengths would change by 5 % somewhere.
     pub fn changed(mut self) -> Self {
         self.ranks = RemeshRanks::Changed;
         self
     }
 
-    /// With these sizes beside those on record: single lengths replace them, shapes and regions are added. Of lengths one by
-    /// one they are the limits and the gradation.
+    /// Adds these sizes to those on record. Single lengths replace the recorded ones; shapes and regions are added.
+    ///
+    /// If lengths are given one by one, these sizes provide only their limits and the gradation.
     pub fn sizes(mut self, sizes: Sizes) -> Self {
         self.sizes.sizes = Some(sizes);
         self
     }
 
-    /// With one length for each tetrahedron of the sub-domains, by rank, in the order in which they are read.
+    /// Sets one length for each tetrahedron of the sub-domains, by rank, in the order in which the tetrahedra are read.
     pub fn lengths_of_tets(mut self, lengths: Vec<f64>) -> Self {
         self.sizes.lengths = Some(Lengths::Given(Values::Tets(lengths)));
         self
     }
 
-    /// With one length for each vertex of the only sub-domain, in the order in which they are read.
+    /// Sets one length for each vertex, in the order in which the vertices are read. Only one sub-domain may be selected.
     pub fn lengths_of_vertices(mut self, lengths: Vec<f64>) -> Self {
         self.sizes.lengths = Some(Lengths::Given(Values::Vertices(lengths)));
         self
     }
 
-    /// With the lengths of a `.npy` file, for the tetrahedra or the vertices of the sub-domains: their number decides.
+    /// Reads the lengths from a `.npy` file. Their number decides whether they belong to tetrahedra or to vertices.
     pub fn lengths_from(mut self, file: impl AsRef<Path>) -> Self {
         self.sizes.lengths = Some(Lengths::File(file.as_ref().to_owned()));
         self
     }
 
-    /// All lengths times `factor`: 0.5 gives edges half as long.
+    /// Multiplies all lengths by `factor`; 0.5 gives edges half as long.
     pub fn scaled(mut self, factor: f64) -> Self {
         self.sizes.factor = Some(factor);
         self
     }
 
-    /// The files are damaged: the sub-domains must become what the catalog says they were. Without a list, all that are damaged.
+    /// Repairs damaged files: the result must match the digests in the catalog. Without a list, all damaged sub-domains are repaired.
     pub fn repair(mut self) -> Self {
         self.repair = true;
         self
     }
 
-    /// Whether the changed mesh is verified. Default: it is.
+    /// Sets whether the changed mesh is verified. Default: true.
     pub fn verify(mut self, verify: bool) -> Self {
         self.verify = verify;
         self
     }
 
-    /// Meshes them again in one step, verifies, and opens the store. The result depends on store and sizes alone. Without any sub-domain
-    /// the store stays as it is.
+    /// Meshes the selected sub-domains in one step, verifies the mesh and opens the store.
     ///
-    /// Errors: `no-such-part`, `no-coarse-leaf`; sizes that make no sense; `store-recipe` where a repair is to give what another recipe
-    /// gave. The store is then as it was.
+    /// The result depends only on the store and the sizes. If no sub-domain is selected, the store stays unchanged.
+    ///
+    /// Errors: `no-such-part`, `no-coarse-leaf`; sizes that make no sense; `store-recipe` for a repair of a store that another recipe
+    /// began. After these errors the store is unchanged.
     pub fn run(self) -> Result<Remeshed, Error> {
         let summary = guarded(&self.settings, || {
             let Some((summary, lock)) = self.change()? else {
@@ -202,7 +205,7 @@ impl Remesh {
         Remeshed::new(store, summary.unwrap_or_default())
     }
 
-    /// Lists the sub-domains that [`Remesh::run`] would mesh again. Nothing is changed. Errors: as there.
+    /// Lists the sub-domains that [`Remesh::run`] would mesh again. Nothing is changed. Errors: as [`Remesh::run`].
     pub fn forecast(&self) -> Result<Vec<RemeshForecast>, Error> {
         guarded(&self.settings, || {
             let mut open = open_finished(&self.path)?;
@@ -236,7 +239,7 @@ impl Remesh {
         Ok(Some((summary, lock)))
     }
 
-    /// The options of the store, and what to mesh again in it.
+    /// The options of the store, and the request for the pipeline.
     fn request(&self, open: &mut Catalog) -> Result<(Options, Resaturation), Error> {
         let options = Options::from(job::options_of(&open.job()?, &self.path)?);
         let listed = match &self.ranks {
@@ -269,7 +272,7 @@ impl Remeshed {
     }
 }
 
-/// A repair must give what the recipe of then gave; any other change only says that the recipe is another.
+/// A repair must follow the recipe that began the store. Any other change only reports that the recipe differs.
 fn check_recipe(open: &mut Catalog, is_repair: bool, settings: &Settings) -> Result<(), Error> {
     if is_repair {
         return job::check_recipe(open);
@@ -283,7 +286,7 @@ fn check_recipe(open: &mut Catalog, is_repair: bool, settings: &Settings) -> Res
     Ok(())
 }
 
-/// The sub-domains of which something cannot be read.
+/// Lists the sub-domains with unreadable data.
 fn damaged(open: &mut Catalog) -> Result<BTreeSet<u32>, Error> {
     let mut ranks = BTreeSet::new();
     for row in open.subdomains()? {
@@ -296,7 +299,7 @@ fn damaged(open: &mut Catalog) -> Result<BTreeSet<u32>, Error> {
 }
 
 fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), StoreError> {
-    /// For chunks and what redb holds of the file.
+    /// Memory for chunks and for redb's view of the file.
     const MEMORY_BYTES: usize = 8 << 20;
     let mut part = catalog.open_subdomain(rank, MEMORY_BYTES)?;
     part.vertex_chunks().try_for_each(|c| c.map(drop))?;
@@ -306,7 +309,7 @@ fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), StoreError> {
     Ok(part.check()?)
 }
 
-/// Verifies a changed store, against its surface if that is still there, and puts it on record; `lock` was held since.
+/// Verifies a changed store, against its surface if that can be read, and records it. `lock` was held since the change.
 fn verify_changed(
     path: &std::path::Path,
     settings: &Settings,

@@ -13,7 +13,7 @@ use tetdb_io::read::read_lengths;
 use tetdb_kernel::sizing::{Length, SizeField, SizeOptions, SizingError};
 use tetdb_store::store::{Catalog, StoreError};
 
-/// Lengths one by one.
+/// Lengths given one by one, for tetrahedra or vertices.
 #[derive(Clone, Debug)]
 pub enum Lengths {
     Given(Values),
@@ -21,20 +21,20 @@ pub enum Lengths {
     File(PathBuf),
 }
 
-/// Sizes in place of those on record; by default none.
+/// Changes to the recorded sizes; by default none.
 #[derive(Clone, Debug, Default)]
 pub struct RemeshSizes {
-    /// Beside those on record.
+    /// Sizes added to those on record.
     pub sizes: Option<Sizes>,
     pub lengths: Option<Lengths>,
-    /// A factor for all lengths.
+    /// Factor for all lengths.
     pub factor: Option<f64>,
 }
 
 impl RemeshSizes {
-    /// The sizes for sub-domains of these ranks; `None` for the sizes on record.
+    /// Builds the sizes for sub-domains of these ranks; `None` for the recorded sizes.
     ///
-    /// Errors: sizes without a meaning; files that cannot be read; a surface that is not what it was, where its edges are needed.
+    /// Errors: sizes that make no sense; files that cannot be read; a changed surface, if its edges are needed.
     pub fn prepare(
         &self,
         ranks: &BTreeSet<u32>,
@@ -83,7 +83,8 @@ impl RemeshSizes {
     }
 }
 
-/// The field of the given sizes beside those on record, where lengths one by one do not replace it; and the given sizes for the record.
+/// The field of the given sizes combined with the recorded ones; `None` if lengths one by one replace it. Also returns the given sizes
+/// for the record.
 fn field(
     given: Option<(SizeOptions, Option<SizeFile>)>,
     has_lengths: bool,
@@ -105,7 +106,7 @@ fn field(
     Ok((Some(field_of_surface(open, &all, settings)?), asked))
 }
 
-/// The field of the surface a store was made from, with these options. Errors: a surface that is not what it was.
+/// The size field of the surface that a store was made from, with these options. Errors: a changed surface.
 fn field_of_surface(
     open: &mut Catalog,
     all: &Options,
@@ -120,7 +121,7 @@ fn field_of_surface(
     Ok(prepared.field)
 }
 
-/// Least and greatest length; shares are of the diagonal of the box of all sub-domains. Errors: they cross.
+/// Least and greatest length. Shares refer to the diagonal of the bounding box of all sub-domains. Errors: the two cross.
 fn limits(open: &mut Catalog, sizes: &SizeOptions) -> Result<[f64; 2], Error> {
     let rows = open.subdomains()?;
     let side = |axis: usize| {
@@ -136,7 +137,7 @@ fn limits(open: &mut Catalog, sizes: &SizeOptions) -> Result<[f64; 2], Error> {
     }
 }
 
-/// The lengths for the sub-domains. Errors: the file.
+/// The lengths for the sub-domains. Errors: the file cannot be read.
 fn values(
     lengths: &Lengths,
     ranks: &BTreeSet<u32>,
@@ -151,7 +152,7 @@ fn values(
     let n = lengths.len() as u64;
     let only = ranks.first().filter(|_| ranks.len() == 1);
     let n_vertices = only.map(|&rank| Ok::<_, StoreError>(open.subdomain(rank)?.vertices));
-    // The run refuses lengths that are as many as neither.
+    // The run refuses lengths whose number matches neither.
     Ok(match n_vertices.transpose()? {
         Some(n_vertices) if n == n_vertices => Values::Vertices(lengths),
         _ => Values::Tets(lengths),

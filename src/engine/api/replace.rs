@@ -1,8 +1,8 @@
-//! A new store takes the place of an old one, and may be interrupted anywhere.
+//! Replacing a store by a new one, in steps that may be interrupted anywhere.
 //!
-//! `X.tetdb` is the old store until all of the new one is sealed in `X.tetdb.being-made`. Then the old one is renamed to
-//! `X.tetdb.being-replaced`, the new one takes its name, and the old one is removed. Whoever comes next finds out how far that was. The names
-//! are such as nobody gives to a copy of their own, for what bears them is renamed and removed.
+//! `X.tetdb` stays the old store until the new one is completely sealed in `X.tetdb.being-made`. Then the old store is renamed to
+//! `X.tetdb.being-replaced`, the new one to `X.tetdb`, and the old one is removed. The next run finds out how far an interrupted
+//! exchange got. These names are chosen so that nobody uses them for a copy, because folders with these names are renamed and removed.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use tetdb_base::storage::DiskPath;
 use tetdb_schema::catalog::StoreState;
 use tetdb_store::store::{Catalog, StoreError, WriterLock};
 
-/// Where the new store is built.
+/// Path where the new store is built.
 #[doc(hidden)]
 pub fn new_of(path: &Path) -> PathBuf {
     beside(path, "being-made")
@@ -21,7 +21,7 @@ fn old_of(path: &Path) -> PathBuf {
     beside(path, "being-replaced")
 }
 
-/// The path with one more extension: stores with the same stem never meet.
+/// The path with one more extension, so that stores with the same stem never collide.
 fn beside(path: &Path, extension: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".");
@@ -29,20 +29,20 @@ fn beside(path: &Path, extension: &str) -> PathBuf {
     name.into()
 }
 
-/// How far the store at a path is; `None` where there is none that can be read.
+/// State of the store at a path; `None` if there is no readable store.
 fn state(path: &Path) -> Option<StoreState> {
     path.is_dir().then(|| Catalog::open(path).ok()?.state().ok()).flatten()
 }
 
-/// Whether a replacement of the store at `path` was begun and not brought to its end.
+/// Returns whether an unfinished replacement of the store at `path` exists.
 #[doc(hidden)]
 pub fn is_begun(path: &Path) -> bool {
     state(&new_of(path)).is_some()
 }
 
-/// Brings to its end what an interrupted exchange left: the names are right afterwards.
+/// Completes an interrupted exchange; all names are right afterwards.
 ///
-/// Errors: the disk; `busy` while another run is at it, which has the lock of the new store until all names are right.
+/// Errors: the disk; `busy` while another run holds the lock of the new store, which it keeps until all names are right.
 #[doc(hidden)]
 pub fn settle(path: &Path, settings: &Settings) -> Result<(), Error> {
     let (new, old) = (new_of(path), old_of(path));
@@ -79,9 +79,9 @@ pub fn settle(path: &Path, settings: &Settings) -> Result<(), Error> {
     Ok(())
 }
 
-/// Opens a replacement that was begun for writing if it is of this job, else removes it.
+/// Opens a begun replacement for writing if it has the same job; otherwise removes it.
 ///
-/// Errors: the disk; another process writes it; what is there is no store, or damaged: nothing is removed then.
+/// Errors: the disk; another process writes it; it is no store, or damaged. Nothing is removed in these cases.
 #[doc(hidden)]
 pub fn take_up(
     path: &Path,
@@ -105,11 +105,13 @@ pub fn take_up(
     Ok(None)
 }
 
-/// The new store, which is sealed and closed and whose lock is held, takes its place. Errors: the disk.
+/// Puts the new store in the place of the old one. The new store is sealed and closed, and its lock is held.
+///
+/// Errors: the disk.
 #[doc(hidden)]
 pub fn exchange(path: &Path, lock: &WriterLock) -> Result<(), Error> {
     let (new, old) = (new_of(path), old_of(path));
-    // A store whose writer lives is not replaced; while this one is held, no writer begins.
+    // A store with a live writer is not replaced. While this lock is held, no writer can start.
     let held = match Catalog::open_writable(path) {
         Err(error @ StoreError::Busy { .. }) => return Err(error.into()),
         other => other.ok(),
@@ -126,7 +128,9 @@ pub fn exchange(path: &Path, lock: &WriterLock) -> Result<(), Error> {
     Ok(())
 }
 
-/// Removes a store that this program made. It has another name first: what has its name is a whole store, or nothing. Errors: the disk.
+/// Removes a store that this program created. It is renamed first, so that its name always belongs to a complete store or to nothing.
+///
+/// Errors: the disk.
 #[doc(hidden)]
 pub fn remove(path: &Path) -> Result<(), Error> {
     let removed = beside(path, "being-removed");
@@ -137,7 +141,7 @@ pub fn remove(path: &Path) -> Result<(), Error> {
     Ok(DiskPath::from(&removed).remove_dir_all()?)
 }
 
-/// Errors: the disk.
+/// Renames a folder. Errors: the disk.
 fn rename(from: &Path, to: &Path) -> Result<(), Error> {
     Ok(DiskPath::from(from).rename(&to.into())?)
 }

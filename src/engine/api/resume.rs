@@ -1,4 +1,4 @@
-//! An interrupted run goes on.
+//! Resuming an interrupted run.
 
 use std::path::Path;
 
@@ -13,17 +13,19 @@ use tetdb_schema::catalog::StoreState;
 use tetdb_store::store::{Catalog, StoreError};
 
 impl Store {
-    /// Goes on with an interrupted run, verifies the mesh and opens the store; one that is finished is only verified.
+    /// Resumes an interrupted run, verifies the mesh and opens the store. A finished store is only verified.
     ///
-    /// The mesh is that of a run that was never interrupted. Errors: `surface-changed`; `store-recipe` when a version with another recipe
-    /// began it; as [`Mesher::create`](super::Mesher::create).
+    /// The mesh is the same as without the interruption.
+    ///
+    /// Errors: `surface-changed`; `store-recipe` if a version with another recipe began the store; as
+    /// [`Mesher::create`](super::Mesher::create).
     pub fn resume(path: impl AsRef<Path>, settings: Settings) -> Result<Self, Error> {
         let created = resume_reported(path.as_ref(), &settings, true)?;
         Self::open_with(created.path, settings)
     }
 }
 
-/// Goes on with the store at `path`, and verifies it if `verify`.
+/// Resumes the run of the store at `path`, and verifies the mesh if `verify` is true.
 #[doc(hidden)]
 pub fn resume_reported(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error> {
     guarded(settings, || run(path, settings, verify))
@@ -32,7 +34,7 @@ pub fn resume_reported(path: &Path, settings: &Settings, verify: bool) -> Result
 fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error> {
     let cap = settings.cap()?;
     replace::settle(path, settings)?;
-    // A run that replaces a store was interrupted: what it replaces is finished.
+    // The interrupted run may have been replacing a store; the store at `path` is finished then.
     let replaces = replace::is_begun(path);
     let place = match replaces {
         true => replace::new_of(path),

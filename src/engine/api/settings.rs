@@ -1,4 +1,4 @@
-//! How a run works, which never changes what it makes: memory, threads, cancelling, progress.
+//! Settings of a run: memory, threads, cancelling, progress. None of them changes the mesh.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -11,36 +11,38 @@ use crate::pipeline::{self, Hands, MEMORY_MIN, Watcher};
 use tetdb_base::storage::{Budget, CancelToken, ScratchSpace};
 use tetdb_kernel::sizing::SizeWarning;
 
-/// What a run says while it works.
+/// An event that a run reports to its listener.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Event {
-    /// Work on the way; comes often.
+    /// Progress of the work; sent often.
     Progress {
-        /// One or two words, always the same for the same work.
+        /// One or two words, constant for the same work.
         stage: &'static str,
         /// Work done so far, in `unit`.
         done: u64,
-        /// Work in all, where that is known.
+        /// Total work, if known.
         total: Option<u64>,
-        /// What `done` and `total` count.
+        /// Unit of `done` and `total`.
         unit: &'static str,
     },
-    /// Something worth knowing.
+    /// Information for the user.
     Note(String),
-    /// Something that may not be as wanted.
+    /// A result that may differ from the intended one.
     Warning(String),
     /// A wanted size that the mesh will not have; see [`SizeWarning`].
     SizeWarning(SizeWarning),
-    /// The surface of a store is not where it was: its mesh is verified without it.
+    /// The surface of a store cannot be read. The mesh is verified without it.
     SurfaceMissing,
-    /// From now on there is a store at this path, which can be resumed.
+    /// The store at this path exists from now on and can be resumed.
     StoreBegun(PathBuf),
 }
 
 type Listener = Arc<dyn Fn(&Event) + Send + Sync>;
 
-/// How a run works: none of it changes the mesh. Clones share the token and the listener.
+/// Settings of a run: memory, threads, cancelling, progress.
+///
+/// None of them changes the mesh. Clones share the token and the listener.
 #[derive(Clone, Default)]
 pub struct Settings {
     memory: Option<Bytes>,
@@ -48,7 +50,7 @@ pub struct Settings {
     pub(super) cancel: CancelToken,
     progress: Option<Listener>,
     scratch: Option<PathBuf>,
-    /// Other processes that share the work.
+    /// Other processes that do part of the work.
     pub(super) hands: Hands,
 }
 
@@ -59,61 +61,62 @@ impl fmt::Debug for Settings {
 }
 
 impl Settings {
-    /// 60 % of the memory that is free when a run begins, one thread per core, no listener.
+    /// Default settings: a cap of 60 % of the memory that is free when a run begins, one thread per core, no listener.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Caps what the run holds. At least 64 MiB.
+    /// Sets the memory cap of the run; at least 64 MiB.
     pub fn memory(mut self, cap: Bytes) -> Self {
         self.memory = Some(cap);
         self
     }
 
-    /// Threads of the run; they end with it.
+    /// Sets the number of threads. The threads end with the run.
     pub fn threads(mut self, n: usize) -> Self {
         self.threads = Some(n);
         self
     }
 
-    /// The run ends soon after this token is cancelled.
+    /// Ends the run soon after this token is cancelled.
     pub fn cancel(mut self, token: &CancelToken) -> Self {
         self.cancel = token.clone();
         self
     }
 
-    /// Is called with each [`Event`], on whatever thread; it must be quick.
+    /// Calls `listener` with each [`Event`], on any thread. The listener must return quickly.
     pub fn progress(mut self, listener: impl Fn(&Event) + Send + Sync + 'static) -> Self {
         self.progress = Some(Arc::new(listener));
         self
     }
 
-    /// Folder of the temporary files of calls that only read. Default: that of the system. A new mesh keeps its own beside the store.
+    /// Sets the folder for temporary files of calls that only read. Default: the system's. A run that creates a mesh keeps its temporary
+    /// files next to the store.
     pub fn scratch(mut self, folder: impl Into<PathBuf>) -> Self {
         self.scratch = Some(folder.into());
         self
     }
 
-    /// Memory and temporary files of a call that only reads, less `held` bytes.
+    /// Memory and temporary files for a call that only reads. `held`: bytes already in use.
     #[doc(hidden)]
     pub fn scratch_space(&self, held: u64) -> Result<ScratchSpace, Error> {
         Ok(ScratchSpace::new(self.cap()?.saturating_sub(held), self.scratch_dir()))
     }
 
-    /// Folder of the temporary files of calls that only read.
+    /// Folder for temporary files of calls that only read.
     #[doc(hidden)]
     pub fn scratch_dir(&self) -> PathBuf {
         self.scratch.clone().unwrap_or_else(std::env::temp_dir)
     }
 
-    /// Threads of the run.
+    /// Number of threads of the run.
     pub fn n_threads(&self) -> usize {
         self.threads.unwrap_or_else(|| {
             std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
         })
     }
 
-    /// The cap in words, and where it comes from.
+    /// The cap and its origin, in words.
     pub(super) fn cap_in_words(&self) -> String {
         match self.memory {
             Some(cap) => format!("{cap} (as asked for)"),
@@ -124,7 +127,9 @@ impl Settings {
         }
     }
 
-    /// The cap in bytes. Errors: `memory`, when it is less than any run needs; `usage`, when there is no thread.
+    /// The cap in bytes.
+    ///
+    /// Errors: `memory` if the cap is below the minimum of any run; `usage` if the number of threads is zero.
     pub fn cap(&self) -> Result<u64, Error> {
         if self.threads == Some(0) {
             return Err(
@@ -161,7 +166,7 @@ impl Settings {
         self.say(&Event::Warning(text.into()));
     }
 
-    /// The pipeline's events as ours.
+    /// A listener for the pipeline's events, which passes them on as [`Event`]s.
     pub(super) fn watcher(&self) -> Box<Watcher<'_>> {
         Box::new(|event: pipeline::Event| {
             self.say(&Event::Progress {
@@ -173,7 +178,7 @@ impl Settings {
         })
     }
 
-    /// Progress of something counted.
+    /// Reports progress of counted work.
     pub(super) fn count(&self, stage: &'static str, done: u64, total: u64, unit: &'static str) {
         let total = Some(total);
         self.say(&Event::Progress { stage, done, total, unit });

@@ -1,4 +1,4 @@
-//! Wanted edge lengths.
+//! Wanted edge lengths of a new mesh.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -9,9 +9,9 @@ use crate::pipeline::SizeFile;
 use tetdb_base::geom::Point;
 use tetdb_kernel::sizing::{Formula, Length, RegionSize, SizeOptions, SizeSource, SourceShape};
 
-/// Wanted edge lengths: those of the surface's own edges, and where something else is said here, the least of all.
+/// Wanted edge lengths: the lengths of the surface's own edges, and the sizes given here. The least of all counts.
 ///
-/// Values without a meaning are refused when the mesh is begun.
+/// Values that make no sense are refused when meshing starts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sizes {
     sizes: SizeOptions,
@@ -21,43 +21,43 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// The lengths of the surface's own edges, growing inwards.
+    /// Uses the lengths of the surface's own edges, growing inwards.
     pub fn from_surface() -> Self {
         Self::default()
     }
 
-    /// `h` inside, joined to the surface's edges by the gradation.
+    /// Wants `h` in the interior. The gradation joins `h` to the surface's edges.
     pub fn interior(h: Length) -> Self {
         let mut sizes = Self::default();
         sizes.sizes.hsiz = Some(h);
         sizes
     }
 
-    /// No length below `h` away from the surface.
+    /// Allows no length below `h` away from the surface.
     pub fn at_least(mut self, h: Length) -> Self {
         self.sizes.hmin = Some(h);
         self
     }
 
-    /// No length above `h`.
+    /// Allows no length above `h`.
     pub fn at_most(mut self, h: Length) -> Self {
         self.sizes.hmax = Some(h);
         self
     }
 
-    /// The ratio of neighboring edge lengths at most, above 1. Default: 1.3.
+    /// Limits the ratio of neighboring edge lengths; above 1. Default: 1.3.
     pub fn gradation(mut self, ratio: f64) -> Self {
         self.sizes.hgrad = Some(ratio);
         self
     }
 
-    /// `h` in the box between two corners; outside of it lengths grow, or are `outside` at most.
+    /// Wants `h` in the box between two corners. Outside the box, lengths grow, or are at most `outside`.
     pub fn in_box(self, low: [f64; 3], high: [f64; 3], h: Length, outside: Option<Length>) -> Self {
         let [p, q] = [low, high].map(Point::from_array);
         self.with_shape(SourceShape::Box { low: p.min(q), high: p.max(q) }, h, outside)
     }
 
-    /// `h` in a ball; outside of it lengths grow, or are `outside` at most.
+    /// Wants `h` in a ball. Outside the ball, lengths grow, or are at most `outside`.
     pub fn in_sphere(
         self,
         center: [f64; 3],
@@ -69,7 +69,7 @@ impl Sizes {
         self.with_shape(SourceShape::Sphere { center, radius }, h, outside)
     }
 
-    /// `h` in a cylinder around the axis from `a` to `b`; outside of it lengths grow, or are `outside` at most.
+    /// Wants `h` in a cylinder around the axis from `a` to `b`. Outside the cylinder, lengths grow, or are at most `outside`.
     pub fn in_cylinder(
         self,
         a: [f64; 3],
@@ -82,19 +82,19 @@ impl Sizes {
         self.with_shape(SourceShape::Cylinder { ends, radius }, h, outside)
     }
 
-    /// `h` at most in a region, named by its number or by a label on it.
+    /// Wants at most `h` in a region, given by its number, its name or a label on it.
     pub fn in_region(mut self, region_or_label: &str, h: Length) -> Self {
         self.sizes.regions.push(RegionSize { which: region_or_label.trim().to_owned(), h });
         self
     }
 
-    /// A length as an expression in x, y and z, such as `0.06 + 0.1*abs(z)`.
+    /// Adds a length as an expression in x, y and z, such as `0.06 + 0.1*abs(z)`.
     pub fn expression(mut self, text: &str) -> Self {
         self.expression = Some(text.to_owned());
         self
     }
 
-    /// Lengths at the vertices of a background mesh: a MEDIT `.sol` with its `.mesh` beside it.
+    /// Reads lengths at the vertices of a background mesh: a MEDIT `.sol` file with its `.mesh` file next to it.
     pub fn field(mut self, file: impl AsRef<Path>) -> Self {
         let path = file.as_ref().to_string_lossy().into_owned();
         self.file = Some(SizeFile { path, hash: None });
@@ -102,10 +102,13 @@ impl Sizes {
         self
     }
 
-    /// Lengths at the vertices of a tetrahedral background mesh, linear in between; nothing is asked for outside of it.
+    /// Sets lengths at the vertices of a tetrahedral background mesh, linear in between. Outside the background mesh they have no
+    /// effect.
     ///
-    /// SourceShape: `lengths` runs parallel to `points`, which `tets` index. The store keeps a copy. For a new mesh only. Errors:
-    /// `count-mismatch`, `not-a-number`, `index-out-of-range`, `bad-size`, `unsupported-content` name the point or the tetrahedron.
+    /// Shape: `lengths` runs parallel to `points`; `tets` has positions in `points`. The store keeps a copy. Only for a new mesh.
+    ///
+    /// Errors: `count-mismatch`, `not-a-number`, `index-out-of-range`, `bad-size` and `unsupported-content` name the point or the
+    /// tetrahedron.
     pub fn field_of_arrays(
         mut self,
         points: &[[f64; 3]],
@@ -123,7 +126,7 @@ impl Sizes {
         self
     }
 
-    /// The sizes without those of files and arrays. Errors: values without a meaning.
+    /// The options of these sizes, without files and arrays. Errors: values that make no sense.
     pub(super) fn options(&self) -> Result<SizeOptions, Error> {
         let formula = self.expression.as_deref().map(Formula::parse).transpose()?;
         let sizes =

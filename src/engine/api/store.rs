@@ -1,4 +1,4 @@
-//! A finished store.
+//! A finished store, open for reading.
 
 use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
@@ -15,8 +15,10 @@ use tetdb_store::store::{Catalog, StoreError};
 /// Memory of one open sub-domain: half for the database, half for decoded vertices.
 const SUBDOMAIN_BYTES: usize = 16 << 20;
 
-/// A finished store, open for reading. Others may read and change it at the same time: this goes on to answer from the state it was
-/// opened in, or with the error `store-changed` where files of that state are gone.
+/// A finished store, open for reading.
+///
+/// Other processes may read and change the store at the same time. Answers come from the state in which the store was opened. A call
+/// fails with `store-changed` if files of that state are gone.
 ///
 /// ```
 /// # use tetdb_engine::api as tetdb;
@@ -38,39 +40,39 @@ pub struct Store {
     path: PathBuf,
     settings: Settings,
     context: RunContext,
-    /// What all answers come from, whatever others do to the store meanwhile.
+    /// The catalog in the state in which it was opened, whatever other processes change.
     catalog: Catalog,
     summary: Summary,
     session: Option<QuerySession>,
 }
 
-/// What a store holds, in numbers.
+/// Counts, digests and labels of a store.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Summary {
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub n_tets: u64,
-    /// Vertices; one shared by several sub-domains counts in each.
+    /// Number of vertices. A vertex shared by several sub-domains counts in each.
     pub n_vertices: u64,
     /// Bytes of the sub-domains' files.
     pub bytes: u64,
-    /// One number for the mesh, the same for equal meshes: 32 hexadecimal digits.
+    /// Digest of the mesh as 32 hexadecimal digits. Equal meshes have equal digests.
     pub digest: String,
-    /// The same of the interface faces.
+    /// Digest of the interface faces.
     pub interface_digest: String,
-    /// Whether a verification is on record.
+    /// True if a verification is on record.
     pub is_verified: bool,
     /// The greatest q = √6/12 · longest edge / inradius; 1 is regular.
     pub worst_quality: f64,
-    /// Names of the labels; a label is a position here.
+    /// Names of the labels. A label is a position in this list.
     pub labels: Vec<String>,
-    /// Regions by number, empty ones among them.
+    /// Regions by number, including empty ones.
     pub regions: Vec<RegionRow>,
-    /// What regions 1, 2, … are called, empty for one without a name; none at all where no region has one.
+    /// Names of regions 1, 2, …; empty for a region without a name. No elements if no region has a name.
     pub region_names: Vec<String>,
-    /// Sub-domains by rank.
+    /// Sub-domains, in order of rank.
     pub subdomains: Vec<SubdomainRow>,
-    /// Which sub-domains share how many faces, by cut.
+    /// Pairs of sub-domains and the number of faces that they share, in order of cut.
     pub interfaces: Vec<InterfaceRow>,
 }
 
@@ -80,7 +82,7 @@ impl Store {
         Self::open_with(path, Settings::new())
     }
 
-    /// The same, with settings for all that follows.
+    /// Like [`Store::open`], with settings for all later calls.
     pub fn open_with(path: impl AsRef<Path>, settings: Settings) -> Result<Self, Error> {
         let path = path.as_ref().to_owned();
         let context = RunContext::new(settings.n_threads(), settings.cancel.clone());
@@ -92,12 +94,12 @@ impl Store {
         Ok(Self { path, settings, context, catalog, summary, session: None })
     }
 
-    /// Where it is.
+    /// Path of the store.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Takes it apart: its path and its settings.
+    /// Splits the store into its path and its settings.
     pub(super) fn into_parts(self) -> (PathBuf, Settings) {
         (self.path, self.settings)
     }
@@ -106,12 +108,12 @@ impl Store {
         &self.settings
     }
 
-    /// What it holds, in numbers.
+    /// Counts, digests and labels of the store.
     pub fn summary(&self) -> &Summary {
         &self.summary
     }
 
-    /// A sub-domain for reading chunk by chunk, without copies beyond the chunk.
+    /// Opens a sub-domain for reading chunk by chunk. Only one chunk at a time is copied.
     ///
     /// Errors: `no-such-part`; damage.
     pub fn subdomain(&self, rank: u32) -> Result<Subdomain, Error> {
@@ -120,9 +122,10 @@ impl Store {
         })
     }
 
-    /// The tetrahedron that holds each point, the first by id where several do; `None` outside of the mesh.
+    /// Finds the tetrahedron that contains each point; `None` outside the mesh. If several contain a point, the one with the lowest id
+    /// is returned.
     ///
-    /// Shape: the answer runs parallel to `points`. Errors: damage; too little memory.
+    /// Shape: the result runs parallel to `points`. Errors: damage; too little memory.
     pub fn locate(
         &mut self,
         points: &[[f64; 3]],
@@ -134,9 +137,9 @@ impl Store {
         })
     }
 
-    /// Verifies the mesh with exact signs, against its surface where that is still at hand.
+    /// Verifies the mesh with exact signs, against its surface if that can still be read.
     ///
-    /// Errors: damage; an invalid mesh is an answer.
+    /// An invalid mesh is a result, not an error. Errors: damage; `surface-changed`.
     pub fn verify(&self, level: VerifyLevel) -> Result<Verification, Error> {
         guarded_in(&self.context, || {
             let sources = self.catalog.share().job()?.surfaces;
@@ -154,7 +157,7 @@ impl Store {
         })
     }
 
-    /// The same against a surface at hand, in place of the files on record.
+    /// Like [`Store::verify`], against the given surface instead of the recorded files.
     pub fn verify_against(
         &self,
         surface: &Surface,
@@ -179,17 +182,17 @@ impl Store {
         Ok(Verification { report })
     }
 
-    /// Whether another store holds the same mesh, bit for bit, in the same sub-domains.
+    /// Returns whether another store has the same mesh, bit for bit, in the same sub-domains.
     pub fn is_same_mesh(&self, other: &Self) -> bool {
         self.summary.digest == other.summary.digest
     }
 
-    /// Closes the session that answers questions; it is opened again when the next is asked.
+    /// Closes the query session. The next question opens it again.
     pub(super) fn close_session(&mut self) {
         self.session = None;
     }
 
-    /// Does `work` with the session that answers questions, which stays open.
+    /// Runs `work` with the query session, and keeps the session open.
     pub(super) fn with_session<T>(
         &mut self,
         work: impl FnOnce(&mut QuerySession) -> Result<T, Error>,
@@ -233,13 +236,13 @@ impl Summary {
     }
 }
 
-/// Opens a store that is finished. Errors: `store-unfinished`.
+/// Opens a finished store. Errors: `store-unfinished`.
 #[doc(hidden)]
 pub fn open_finished(path: &Path) -> Result<Catalog, Error> {
     if_finished(Catalog::open(path)?, path)
 }
 
-/// Opens a store that is finished, to change it. Errors: `store-unfinished`; `busy` while another does.
+/// Opens a finished store to change it. Errors: `store-unfinished`; `busy` while another process changes it.
 #[doc(hidden)]
 pub fn open_to_change(path: &Path, settings: &Settings) -> Result<Catalog, Error> {
     let catalog = Catalog::open_writable(path)?;
@@ -247,7 +250,7 @@ pub fn open_to_change(path: &Path, settings: &Settings) -> Result<Catalog, Error
     if_finished(catalog, path)
 }
 
-/// Says so when nothing but a file keeps others from writing.
+/// Reports a note if other writers are kept away only by a lock file.
 #[doc(hidden)]
 pub fn say_how_locked(catalog: &Catalog, settings: &Settings) {
     if catalog.lock().is_some_and(|lock| lock.is_by_name()) {

@@ -1,4 +1,6 @@
-//! Changes of a surface that would give a better mesh. Each is tried on a copy of the surface, and its gain is measured.
+//! Suggested changes of a surface that would improve the mesh.
+//!
+//! Each change is tried on a copy of the surface, and its gain is measured.
 
 use serde::Serialize;
 
@@ -11,20 +13,20 @@ use tetdb_base::surface::{
 };
 use tetdb_kernel::sizing::SizeField;
 
-/// Shares of the box diagonal within which points are joined on trial.
+/// Joining distances to try, as shares of the box diagonal.
 const WELDS: [f64; 4] = [1e-6, 1e-5, 1e-4, 1e-3];
-/// A change is suggested when it leaves at most this part of the bad triangles or of the worst quality.
+/// A change is suggested if it reduces the share of bad triangles or the worst quality to at most this part.
 const GAIN: f64 = 0.6;
-/// Memory for a trial of divided triangles: those of a surface small enough to be checked in a second or two.
+/// Memory for trying to divide triangles: enough for surfaces that are checked within a second or two.
 const BYTES_MAX: u64 = 64 << 20;
 
-/// How well triangles are shaped.
+/// Shapes of the triangles of a surface, summed up.
 #[derive(Clone, Copy)]
 struct Shapes {
     triangles: usize,
-    /// Those that force a quality of 10 or worse.
+    /// Triangles that force a quality of 10 or worse.
     spoiled: u64,
-    /// The least quality that a tetrahedron on the worst of them can have.
+    /// Best quality possible for a tetrahedron on the worst triangle.
     least: f64,
 }
 
@@ -60,27 +62,27 @@ impl Shapes {
     }
 }
 
-/// A change that makes a better surface.
+/// A change that would improve the surface.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct Suggestion {
     /// `weld` or `refine-surface`.
     pub way: &'static str,
-    /// Points nearer than this share of the box diagonal are joined; `None`: long triangles are divided.
+    /// Joins points closer than this share of the box diagonal; `None`: divides long triangles.
     pub weld: Option<f64>,
-    /// Triangles afterwards.
+    /// Number of triangles after the change.
     pub triangles: usize,
-    /// Those of them that force a quality of 10 or worse.
+    /// Triangles after the change that force a quality of 10 or worse.
     #[serde(rename = "hopeless_triangles")]
     pub spoiled_triangles: u64,
-    /// The least quality that a tetrahedron on the worst of them can have.
+    /// Best quality possible for a tetrahedron on the worst triangle after the change.
     pub least_quality: f64,
-    /// Shapes afterwards and now, in words.
+    /// Shapes after the change and now, in words.
     #[serde(skip)]
     pub effect: String,
 }
 
-/// The changes that would gain something on a surface without defects; `field` has its default sizes.
+/// Lists the changes that would improve a surface without defects. `field` has its default sizes.
 pub(super) fn suggestions(
     surface: &Surface,
     found: &Fitness,
@@ -104,7 +106,7 @@ pub(super) fn suggestions(
             && attempt(|| validate_with(&tried, &scratch)).is_ok_and(|found| found.is_valid());
         is_valid.then(|| (Some(share), measured(&tried)))
     });
-    // The smallest change of the shape that does it.
+    // Only the weld with the smallest distance that gains enough is kept.
     let welded = welded.filter(|(_, after)| after.is_gain_on(&before)).take(1);
     let tried = divided.into_iter().chain(welded);
     let gained = tried.filter(|(_, after)| after.is_gain_on(&before));

@@ -1,4 +1,4 @@
-//! The surface that is meshed.
+//! The input surface: reading, checking, refining and embedding sheets.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -18,46 +18,47 @@ use tetdb_io::write::{self, SurfaceWritten};
 use tetdb_kernel::samples::{PREFIX, SampleSpec};
 use tetdb_kernel::sizing::{ExtraSizes, SizeField, SizeOptions};
 
-/// A triangle surface with labels, read or given, all triangles turned like their neighbors.
+/// A triangle surface with labels, read from files, generated or given as arrays.
 ///
-/// Is not: validated; that happens before a mesh is begun.
+/// Invariant: all triangles are oriented like their neighbors. A surface is not validated on its own; [`Mesher`](super::Mesher)
+/// validates it before meshing starts.
 #[derive(Clone, Debug)]
 pub struct Surface {
     #[doc(hidden)]
     pub inner: surface::Surface,
     #[doc(hidden)]
     pub sources: Vec<Source>,
-    /// Triangles that were turned round.
+    /// Number of triangles whose orientation was reversed.
     #[doc(hidden)]
     pub turned: usize,
-    /// Whether triangles are divided where edges and points to come lie on them.
+    /// True if triangles are divided where embedded edges and points lie on them.
     pub(super) divides: bool,
 }
 
-/// What is wrong with a surface, and what its triangles allow.
+/// Defects of a surface, and measures of its triangles.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct CheckReport {
-    /// Each defect as the error it would be, some hundred at most.
+    /// Each defect as an error; about a hundred at most.
     pub defects: Vec<Error>,
-    /// Where each of `defects` is, in the same order.
+    /// Place of each defect. Shape: parallel to `defects`.
     pub places: Vec<DefectPlace>,
-    /// All defects.
+    /// Number of all defects, listed or not.
     pub n_defects: u64,
     /// Edges with one triangle.
     pub n_open_edges: usize,
-    /// Triangles with an angle of less than five degrees.
+    /// Triangles with an angle below five degrees.
     pub n_small_angles: usize,
-    /// Triangles on which no tetrahedron can have q < 2.
+    /// Triangles on which every tetrahedron has quality q ≥ 2.
     pub n_forcing_triangles: usize,
-    /// Least, median and greatest edge length.
+    /// Least, median and greatest edge length, in input units.
     pub edges: [f64; 3],
-    /// Enclosed volume, of a closed surface.
+    /// Enclosed volume in cubed input units; `None` for an open surface.
     pub volume: Option<f64>,
 }
 
 impl CheckReport {
-    /// Whether it can be meshed.
+    /// Returns whether the surface can be meshed.
     pub fn is_valid(&self) -> bool {
         self.n_defects == 0
     }
@@ -78,9 +79,9 @@ impl CheckReport {
     }
 }
 
-/// Divides triangles until their edges are as short as `options` want them; where the surface is finer, sizes grow from its edges.
+/// Divides triangles until their edges are as short as `options` require. Where the surface is finer, sizes grow from its edges.
 ///
-/// Errors: more triangles than `scratch` has memory for.
+/// Errors: more triangles than fit in the memory of `scratch`.
 pub(super) fn refine(
     surface: &surface::Surface,
     options: &SizeOptions,
@@ -96,7 +97,7 @@ pub(super) fn refine(
     Ok(split(surface, &|p| field.h(p).min(wanted), left)?)
 }
 
-/// What cannot be done any more once there are sheets.
+/// Refuses an operation on a surface with sheets or embedded edges and points. `what` is the operation, as a participle.
 pub(super) fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
     match surface.has_sheets() || surface.has_embedded() {
         false => Ok(()),
@@ -107,9 +108,11 @@ pub(super) fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<()
 }
 
 impl Surface {
-    /// Reads files as one surface, each file a label unless it has labels of its own.
+    /// Reads files as one surface. Each file is one label, unless the file has labels of its own.
     ///
-    /// STL, PLY, OBJ, OFF, MEDIT, Gmsh and TetGen files, also packed as `.gz` or `.zst`, and pipes. Errors: what cannot be read, with its line or byte.
+    /// Formats: STL, PLY, OBJ, OFF, MEDIT, Gmsh and TetGen, also compressed as `.gz` or `.zst`, and pipes.
+    ///
+    /// Errors: a file that cannot be read, with the line or byte.
     pub fn read<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> Result<Self, Error> {
         let paths: Vec<PathBuf> = files.into_iter().map(|p| p.as_ref().to_owned()).collect();
         guarded(&Settings::new(), || {
@@ -118,10 +121,12 @@ impl Surface {
         })
     }
 
-    /// A surface of `points` and `triangles`, each three positions in `points`, counter-clockwise seen from outside or all the other way.
+    /// A surface from arrays.
     ///
-    /// Shape: `labels`, if given, runs parallel to `triangles`; a name each. The store keeps a copy of such a surface.
-    /// Errors: `index-out-of-range`, `not-a-number`, `count-mismatch` name the triangle or the point.
+    /// Shape: each triangle is three positions in `points`. `labels`, if given, runs parallel to `triangles` and has a name for each.
+    /// Triangles are counter-clockwise seen from outside, or all clockwise. The store keeps a copy of such a surface.
+    ///
+    /// Errors: `index-out-of-range`, `not-a-number` and `count-mismatch` name the triangle or the point.
     pub fn from_arrays(
         points: &[[f64; 3]],
         triangles: &[[u32; 3]],
@@ -137,9 +142,9 @@ impl Surface {
         })
     }
 
-    /// A generated surface such as `balls,count=100,seed=1` or `box,h=0.1`.
+    /// A generated surface, such as `balls,count=100,seed=1` or `box,h=0.1`.
     ///
-    /// Errors: `bad-sample` names what is wrong.
+    /// Errors: `bad-sample`, with the reason.
     pub fn sample(spec: &str) -> Result<Self, Error> {
         guarded(&Settings::new(), || {
             let word = format!("{PREFIX}{}", spec.trim_start_matches(PREFIX));
@@ -152,12 +157,12 @@ impl Surface {
         self.inner.n_input_triangles()
     }
 
-    /// Number of vertices, those with the same coordinates counted once.
+    /// Number of vertices; vertices with equal coordinates count once.
     pub fn n_vertices(&self) -> usize {
         self.inner.n_input_vertices()
     }
 
-    /// Low and high corner of the smallest box around it.
+    /// Low and high corner of the bounding box.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         let bounds = self.inner.bounds();
         [bounds.low, bounds.high].map(|p| p.to_array())
@@ -168,7 +173,9 @@ impl Surface {
         &self.inner.label_names
     }
 
-    /// Whether it can be meshed. Errors: the first of the worst defects, with its place and the number of all.
+    /// Checks that the surface can be meshed.
+    ///
+    /// Errors: the first of the worst defects, with its place and the number of all defects.
     pub fn validate(&self) -> Result<(), Error> {
         guarded(&Settings::new(), || {
             surface::validate(&self.inner).accept()?;
@@ -176,7 +183,7 @@ impl Surface {
         })
     }
 
-    /// All that is wrong with it, and what its triangles allow. Is not: an error, however much is wrong.
+    /// Reports all defects of the surface and the measures of its triangles. Defects are not an error here.
     pub fn check(&self) -> Result<CheckReport, Error> {
         guarded(&Settings::new(), || {
             let validation = surface::validate(&self.inner);
@@ -185,9 +192,10 @@ impl Surface {
         })
     }
 
-    /// The same surface in triangles with edges of `h` at most, where they are longer; new vertices lie on the old triangles.
+    /// Divides triangles until no edge is longer than `h`. New vertices lie on the old triangles. Where the surface is finer, lengths
+    /// grow from its edges.
     ///
-    /// Errors: defects; a length without a meaning.
+    /// Errors: a surface with defects; a length that makes no sense.
     pub fn refined(mut self, h: Length) -> Result<Self, Error> {
         guarded(&Settings::new(), || {
             surface::validate(&self.inner).accept()?;
@@ -198,7 +206,7 @@ impl Surface {
         })
     }
 
-    /// Divides triangles until their edges are as short as `h` wants them where they are, and the result takes half of `cap` at most.
+    /// Divides triangles until their edges are as short as `h` at their position. The divided surface takes at most half of `cap`.
     #[doc(hidden)]
     pub fn divide(
         &mut self,
@@ -210,10 +218,12 @@ impl Surface {
         self.keep_all(scratch)
     }
 
-    /// The same with the triangles of `sheet` inside: faces of the mesh with tetrahedra on both sides, that part no region.
+    /// Embeds the triangles of `sheet` in the domain. They become faces of the mesh with tetrahedra on both sides, and separate no
+    /// regions.
     ///
-    /// A sheet may be open or closed, end inside, meet other sheets and the surface along edges and vertices that both have, and nowhere
-    /// else. Its labels are called `name:LABEL`, or `name` where it has one alone. Default name: that of its file.
+    /// A sheet may be open or closed, and may end inside the domain. It may touch other sheets and the surface only along edges and
+    /// vertices that both have. Its labels are named `name:LABEL`, or `name` if the sheet has only one label. Default of `name`: the
+    /// name of the sheet's file.
     pub fn embedded(mut self, sheet: Surface, name: Option<&str>) -> Result<Self, Error> {
         self.refuse_wires()?;
         let default = sheet.name();
@@ -244,13 +254,15 @@ impl Surface {
         Ok(self)
     }
 
-    /// The same with what of it is not closed as sheets, see [`Surface::embedded`]: triangles at an edge without a second triangle, then
-    /// those that are at one without them, and so on.
+    /// Turns the open parts of the surface into sheets; see [`Surface::embedded`].
+    ///
+    /// Open parts are triangles at an edge without a second triangle. Removing them may open further edges; the triangles there follow,
+    /// and so on.
     pub fn open_parts_as_sheets(self) -> Result<Self, Error> {
         guarded(&Settings::new(), || Ok(self.open_parts_in(&ScratchSpace::boundless())?.0))
     }
 
-    /// The same, and how many triangles that are.
+    /// Like [`Surface::open_parts_as_sheets`], and returns the number of triangles turned into sheets.
     pub(super) fn open_parts_in(mut self, scratch: &ScratchSpace) -> Result<(Self, usize), Error> {
         self.refuse_wires()?;
         let n = attempt(|| self.inner.open_parts_to_sheets(scratch))?;
@@ -265,14 +277,16 @@ impl Surface {
         }
     }
 
-    /// What its first file is called, without folder and extension.
+    /// Name of the first file, without folder and extension.
     fn name(&self) -> String {
         let file = self.inner.files.first().map(|file| Path::new(&file.name));
         let stem = file.and_then(Path::file_stem).map(|stem| stem.to_string_lossy());
         stem.filter(|s| !s.is_empty()).map_or("sheet".to_owned(), |s| s.into_owned())
     }
 
-    /// Writes it, without embedded edges and points, as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
+    /// Writes the surface as `.stl`, `.off`, `.obj` or `.ply`, without embedded edges and points.
+    ///
+    /// Errors: `unknown-format`, `lossy-format`; the disk.
     pub fn write(&self, out: impl AsRef<Path>) -> Result<SurfaceWritten, Error> {
         guarded(&Settings::new(), || {
             Ok(match self.inner.has_embedded() {
@@ -282,7 +296,7 @@ impl Surface {
         })
     }
 
-    /// Reads files, or one sample, in no more than `cap` bytes of memory.
+    /// Reads files, or generates one sample, within `cap` bytes of memory.
     pub(super) fn load_within(words: &[String], cap: u64) -> Result<Self, Error> {
         let samples = words.iter().filter(|word| word.starts_with(PREFIX)).count();
         match (samples, words) {
@@ -294,7 +308,7 @@ impl Surface {
         }
     }
 
-    /// Turns all triangles like their neighbors.
+    /// Orients all triangles like their neighbors.
     pub(super) fn oriented(mut self, scratch: &ScratchSpace) -> Result<Self, Error> {
         self.inner.shrink();
         let orientation = attempt(|| orient_alike_with(&mut self.inner, scratch))?;
@@ -302,7 +316,7 @@ impl Surface {
         Ok(self)
     }
 
-    /// What is worth knowing of how it was read.
+    /// Notes on how the surface was read.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.inner.notes.iter().map(ToString::to_string).collect();
         if self.turned > 0 {
@@ -312,7 +326,7 @@ impl Surface {
         notes
     }
 
-    /// Puts a copy of a surface that came from no file into the store's folder. Errors: the disk.
+    /// Writes a copy of a surface that came from no file to the store's folder. Errors: the disk.
     #[doc(hidden)]
     pub fn keep_in(&self, store: &Path) -> Result<(), Error> {
         if self.sources.iter().any(|source| source.origin == Origin::Copy) {
@@ -321,9 +335,9 @@ impl Surface {
         self.keep_wires_in(store)
     }
 
-    /// The surface a store at `store` was made from, as it was read then.
+    /// Reads again the surface that the store at `store` was made from.
     ///
-    /// Errors: `unreadable-file`; `surface-changed` when a file is not what it was.
+    /// Errors: `unreadable-file`; `surface-changed` if a file has changed since.
     #[doc(hidden)]
     pub fn of_record(
         sources: &[SurfaceSource],
@@ -348,7 +362,7 @@ impl Surface {
                 Self::load_within(&own.iter().map(|s| s.to_record().path).collect::<Vec<_>>(), cap)?
             }
         };
-        // A copy with sheets was turned before they came in.
+        // The triangles of a copy with sheets were oriented before the sheets were embedded.
         if !inside.iter().any(|s| matches!(s.origin, Origin::SheetsFrom(_))) {
             surface = surface.oriented(scratch)?;
         }
@@ -369,7 +383,7 @@ impl Surface {
         Ok(surface)
     }
 
-    /// Adds a part inside that is on record.
+    /// Embeds a recorded sheet, or recorded edges or points.
     fn with_inside(
         mut self,
         origin: &Origin,
@@ -403,7 +417,7 @@ impl Surface {
         }
     }
 
-    /// A surface that came from no file.
+    /// A surface that came from no file. The store keeps a copy of it.
     pub(super) fn given(inner: surface::Surface) -> Self {
         let source = given(&inner);
         Self::of(inner, vec![source])
@@ -422,7 +436,7 @@ impl Surface {
     }
 
     fn read_in(paths: &[PathBuf], cap: u64) -> Result<Self, Error> {
-        // What can be read but once is not there for a later run: the store keeps a copy.
+        // A stream can be read only once and is gone in a later run, so the store keeps a copy.
         let is_stream = paths.iter().any(|path| is_stream(path));
         let inner = read_surface(paths, cap)?;
         let sources = match is_stream {
@@ -457,7 +471,7 @@ impl Surface {
     }
 }
 
-/// What identifies a surface that came from no file.
+/// Identity of a surface that came from no file: a hash of points, triangles and labels.
 pub(super) fn given(surface: &surface::Surface) -> Source {
     let mut hash = Xxh3::new();
     for x in surface.points.iter().flat_map(|p| p.to_array()) {
@@ -470,13 +484,13 @@ pub(super) fn given(surface: &surface::Surface) -> Source {
     Source { origin: Origin::Copy, bytes: 0, hash: halves(&hash) }
 }
 
-/// Where a store keeps the copy of a surface that came from no file.
+/// Path in a store for the copy of a surface that came from no file.
 #[doc(hidden)]
 pub fn in_store(store: &Path) -> PathBuf {
     store.join("surface.obj")
 }
 
-/// What identifies a file later: absolute path, length, hash.
+/// Identity of a file: absolute path, length and hash.
 #[doc(hidden)]
 pub fn source(path: &Path) -> Result<Source, Error> {
     let io = |e: std::io::Error| {
@@ -506,7 +520,7 @@ pub fn source(path: &Path) -> Result<Source, Error> {
     Ok(Source { origin, bytes, hash: halves(&hash) })
 }
 
-/// Low half first.
+/// The two halves of a 128-bit hash, low half first.
 pub(super) fn halves(hash: &Xxh3) -> [u64; 2] {
     let digest = hash.digest128();
     [digest as u64, (digest >> 64) as u64]

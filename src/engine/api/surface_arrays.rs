@@ -1,13 +1,13 @@
-//! A surface as arrays.
+//! The vertices, triangles and labels of a surface as arrays.
 
 use super::Surface;
 impl Surface {
-    /// Positions of the vertices, those with the same coordinates once.
+    /// Positions of the vertices; vertices with equal coordinates appear once.
     pub fn points(&self) -> &[[f64; 3]] {
         bytemuck::cast_slice(&self.inner.points[..self.inner.n_input_vertices()])
     }
 
-    /// Three positions in [`Surface::points`] for each triangle, turned like their neighbors.
+    /// Corners of each triangle as three positions in [`Surface::points`]. All triangles are oriented like their neighbors.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.inner.triangles[..self.inner.n_input_triangles()]
     }

@@ -1,4 +1,4 @@
-//! Surfaces read, completed and validated within the limits of a run.
+//! Calls on surfaces that respect the memory limit of a run's settings.
 
 use std::path::Path;
 
@@ -11,8 +11,9 @@ use tetdb_io::write;
 use tetdb_kernel::sizing::SizeOptions;
 
 impl Surface {
-    /// Reads files as one surface, or generates the only sample, within the memory of `settings`. Notes on the content go to its
-    /// listener.
+    /// Reads files as one surface, or generates one sample, within the memory of `settings`.
+    ///
+    /// Effects: notes on the content go to the listener of `settings`.
     ///
     /// # Errors
     /// As [`Surface::read`] and [`Surface::sample`].
@@ -26,7 +27,7 @@ impl Surface {
         })
     }
 
-    /// [`Surface::open_parts_as_sheets`], and how many triangles these are.
+    /// Like [`Surface::open_parts_as_sheets`], within the memory of `settings`. Also returns the number of triangles turned into sheets.
     pub fn open_parts_with(self, settings: &Settings) -> Result<(Self, usize), Error> {
         guarded(settings, || self.open_parts_in(&settings.scratch_space(0)?))
     }
@@ -53,7 +54,8 @@ impl Surface {
         })
     }
 
-    /// [`Surface::refined`] with a gradation, and what was done. The result is validated as well.
+    /// [`Surface::refined`] with a gradation, within the memory of `settings`. The result is validated. Also returns the counts of the
+    /// division.
     pub fn refined_with(
         &self,
         h: Length,
@@ -72,18 +74,18 @@ impl Surface {
         })
     }
 
-    /// Numbers of embedded edges and of embedded points.
+    /// Number of embedded edges and number of embedded points.
     pub fn n_embedded(&self) -> [usize; 2] {
         let embedded = &self.inner.embedded;
         [embedded.edges.len(), embedded.points.len()]
     }
 
-    /// Number of triangles that are sheets.
+    /// Number of triangles in sheets.
     pub fn n_sheet_triangles(&self) -> usize {
         self.inner.n_sheet_triangles()
     }
 
-    /// The shell without the sheets, and the sheets alone.
+    /// Splits the surface in two: the shell without sheets, and the sheets alone.
     pub fn split_sheets(&self) -> [Self; 2] {
         [false, true].map(|sheets| Self::given(self.inner.part(sheets)))
     }

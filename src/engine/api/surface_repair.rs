@@ -1,4 +1,4 @@
-//! Repairs of a surface.
+//! Repairs of a surface: dropping, dividing, orienting and joining.
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -10,25 +10,25 @@ use super::{Bytes, Settings, Surface, guarded};
 use tetdb_base::storage::attempt;
 use tetdb_base::surface::{Repair, repair, repair_bytes, validate_with};
 
-/// Points are joined up to this share of the box diagonal at most: beyond it a surface loses its shape.
+/// Largest share of the box diagonal within which points are joined. Beyond it a surface loses its shape.
 pub const WELD_SHARE_MAX: f64 = 0.01;
 
-/// A repair that was done. Serialized, it is the key `repair` of `tetdb check --json`.
+/// Counts of a repair. Serialized, it is the key `repair` of `tetdb check --json`.
 #[derive(Clone, Debug, Serialize)]
 #[serde(into = "Value")]
 #[non_exhaustive]
 pub struct RepairReport {
-    /// Points nearer than this share of the box diagonal were joined.
+    /// Points closer than this share of the box diagonal were joined; `None` if none were.
     pub weld: Option<f64>,
-    /// The same in input units.
+    /// The joining distance in input units.
     pub weld_distance: Option<f64>,
-    /// Points, triangles and how many of them were joined, dropped, divided or turned.
+    /// Numbers of points joined and of triangles dropped, divided and turned.
     pub done: Repair,
-    /// Triangles before.
+    /// Number of triangles before the repair.
     pub triangles_before: usize,
-    /// Vertices before.
+    /// Number of vertices before the repair.
     pub vertices_before: usize,
-    /// Defects before.
+    /// Number of defects before the repair.
     pub n_defects_before: u64,
 }
 
@@ -48,16 +48,20 @@ impl From<RepairReport> for Value {
 }
 
 impl Surface {
-    /// Without triangles of no area and repeated ones, divided where vertices lie exactly on open edges, turned alike; and points nearer
-    /// than `weld`, a share of the box diagonal up to 0.01, joined.
+    /// Repairs the surface.
+    ///
+    /// Drops repeated triangles and triangles without area, divides triangles where vertices lie exactly on open edges, and orients all
+    /// alike. With `weld`, joins points closer than this share of the box diagonal, at most 0.01.
+    ///
+    /// Errors: as [`Surface::repair_reported`].
     pub fn repaired(self, weld: Option<f64>) -> Result<Self, Error> {
         Ok(self.repair_reported(weld, &Settings::new())?.0)
     }
 
-    /// [`Surface::repaired`], and what was done.
+    /// [`Surface::repaired`] within the memory of `settings`. Also returns the counts of the repair.
     ///
     /// # Errors
-    /// `bad-size` for a share that is too large; `memory`; `usage` after something was embedded.
+    /// `bad-size` for a share that is too large; `memory`; `usage` if anything is embedded.
     pub fn repair_reported(
         mut self,
         weld: Option<f64>,
@@ -86,7 +90,7 @@ impl Surface {
                 (self.inner.n_triangles(), self.inner.n_vertices());
             let weld_distance = weld.map(|share| share * self.inner.bounds().diagonal());
             let mut done = repair(&mut self.inner, weld_distance);
-            // Triangles that were turned when the surface was read count too.
+            // Triangles turned while the surface was read count as well.
             done.turned += self.turned;
             self.turned = done.turned;
             self.sources = vec![given(&self.inner)];

@@ -1,4 +1,4 @@
-//! Everything that is known of a surface before it is meshed.
+//! The report on a surface before it is meshed: defects, shapes, suggestions.
 
 use std::path::Path;
 
@@ -17,45 +17,49 @@ use tetdb_base::surface::{
 };
 use tetdb_io::write;
 
-/// Of surfaces with more triangles the tetrahedra are estimated only on request: sizes and their sum take two to three times as long as
-/// all the rest of a report.
+/// Above this number of triangles, tetrahedra are estimated only on request. Computing sizes and their integral takes two to three times
+/// as long as the rest of the report.
 const ESTIMATED_MAX: usize = 100_000;
-/// Above this share of forced tetrahedra, or of triangles with small angles, better triangles are advised.
+/// Above this share of forced tetrahedra, or of triangles with small angles, the report advises better triangles.
 const POOR_SHARE: f64 = 0.01;
-/// Above this ratio of edge lengths short edges are pointed at.
+/// Above this ratio of edge lengths, the report mentions the short edges.
 const POOR_RATIO: f64 = 1e5;
 
-/// Defects, openness and shapes of a surface, and what would improve it. Serialized, it is the answer of `tetdb check --json`; the
-/// guide lists the keys.
+/// Defects, openness and triangle shapes of a surface, and suggestions for improving it.
+///
+/// Serialized, it is the answer of `tetdb check --json`; the guide lists the keys.
 #[non_exhaustive]
 pub struct SurfaceReport<'a> {
     surface: &'a surface::Surface,
-    /// Triangles that were turned to run like their neighbors.
+    /// Number of triangles turned to be oriented like their neighbors.
     pub n_turned: usize,
     /// Defects, open edges and parts.
     pub validation: Validation,
-    /// Boundaries of the holes, the longest first.
+    /// Boundary loops of the holes, the longest first.
     pub boundary_loops: Vec<BoundaryLoop>,
-    /// Repairs that were tried on an open surface, with growing distance; empty for a closed one.
+    /// Repairs tried on an open surface, with growing distance; empty for a closed one.
     pub closing: Vec<Closing>,
     /// Shapes of the triangles.
     pub fitness: Fitness,
-    /// Estimated tetrahedra with default sizes; `None` for a surface that cannot be meshed, or a large one unless asked for.
+    /// Estimated number of tetrahedra with default sizes. `None` if the surface cannot be meshed, or if it is large and no estimate was
+    /// requested.
     pub tets_expected: Option<f64>,
-    /// Changes that would give a better mesh.
+    /// Changes that would improve the mesh.
     pub suggestions: Vec<Suggestion>,
 }
 
 impl Surface {
-    /// Reports on the surface. With `estimated` the tetrahedra of a large surface are estimated too.
+    /// Reports on the surface.
+    ///
+    /// With `estimated`, the number of tetrahedra is also estimated for a large surface.
     ///
     /// # Errors
-    /// `memory`. Defects are no error.
+    /// `memory`. Defects are not an error.
     pub fn report(&self, settings: &Settings, estimated: bool) -> Result<SurfaceReport<'_>, Error> {
         guarded(settings, || SurfaceReport::new(&self.inner, self.turned, settings, estimated))
     }
 
-    /// Writes the triangles with defects to a `.vtu` file, and returns how many there are. Without any, no file is written.
+    /// Writes the triangles with defects to a `.vtu` file and returns their number. Writes no file if there are none.
     ///
     /// # Errors
     /// `unknown-format`; the disk.
@@ -113,30 +117,30 @@ impl<'a> SurfaceReport<'a> {
         })
     }
 
-    /// Whether the surface can be meshed.
+    /// Returns whether the surface can be meshed.
     pub fn is_valid(&self) -> bool {
         self.validation.is_valid()
     }
 
-    /// The repair with the least distance that closes the surface.
+    /// The tried repair with the least distance that closes the surface.
     pub fn closes(&self) -> Option<&Closing> {
         self.closing.last().filter(|tried| tried.closes)
     }
 
-    /// Least share of the estimated tetrahedra that cannot be good: at least one stands on each triangle.
+    /// Least share of the estimated tetrahedra with poor quality: each forcing triangle forces at least one.
     pub fn forced_share(&self) -> Option<f64> {
         let n = self.fitness.forcing_triangles as f64;
         self.tets_expected.map(|tets| n / tets)
     }
 
-    /// The least quality that a tetrahedron on the worst triangle can have, and the triangle's centroid.
+    /// Best quality possible for a tetrahedron on the worst triangle, and the centroid of this triangle.
     pub fn least_quality(&self) -> (f64, [f64; 3]) {
         let corners = self.surface.corners(self.fitness.worst_triangle);
         let [a, b, c] = corners;
         (face_least(corners), ((a + b + c) / 3.0).to_array())
     }
 
-    /// Sentences on what would make a better mesh.
+    /// Advice on improving the mesh, in sentences.
     pub fn advice(&self) -> Vec<String> {
         let f = &self.fitness;
         let mut advice = Vec::new();
@@ -183,7 +187,7 @@ impl<'a> SurfaceReport<'a> {
         fitness["forced_share"] = json!(self.forced_share());
         if surface.n_triangles() > 0 {
             let (least, at) = self.least_quality();
-            // Infinite without area: then it is null.
+            // Infinite for a triangle without area; JSON then has null.
             fitness["least_quality"] = json!(least);
             fitness["least_quality_at"] = json!(at);
         }
@@ -207,7 +211,7 @@ impl Serialize for SurfaceReport<'_> {
     }
 }
 
-/// Default sizes and the mesh they predict; `None` where no size makes sense.
+/// Predicts the mesh with default sizes. Returns `None` if `cap` is too small or the prediction fails.
 fn expected(surface: &surface::Surface, settings: &Settings, cap: u64) -> Option<Prepared> {
     if cap < least_for(surface) {
         return None;

@@ -1,4 +1,4 @@
-//! Edges and points in a surface, from files and from arrays.
+//! Embedding edges and points in a surface, from files and from arrays.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -17,28 +17,32 @@ use tetdb_io::read::{WireKind, read_wires};
 use tetdb_io::write;
 
 impl Surface {
-    /// From now on triangles are divided where the ends of embedded edges and embedded points lie exactly on them.
+    /// Lets later calls divide triangles where embedded points, or the ends of embedded edges, lie exactly on them.
     ///
-    /// One inside a triangle divides it in three, one on an edge divides all triangles that have the edge in two. The surface is the same set
-    /// of points: what lies a rounding error beside a triangle is not on it, and refused as too near (`wire-too-near`, with the distance).
-    /// The store keeps a copy of a surface that was divided. Default: what lies on a triangle elsewhere than in a corner is refused.
+    /// A point inside a triangle divides it in three. A point on an edge divides all triangles at this edge in two. The surface stays
+    /// the same set of points. A point that misses a triangle by a rounding error is not on it, and is refused as `wire-too-near`, with
+    /// the distance. The store keeps a copy of a divided surface.
+    ///
+    /// Default: a point on a triangle is refused unless it is a corner.
     pub fn dividing(mut self) -> Self {
         self.divides = true;
         self
     }
 
-    /// The same with the edges of a file inside: `.obj` (`l`), legacy `.vtk` or `.poly` (facets of two corners).
+    /// Embeds the edges of a file: `.obj` (`l`), legacy `.vtk` or `.poly` (facets of two corners).
     ///
-    /// Each becomes an edge of the mesh, whole and in its place. Edges meet each other, sheets and the surface in vertices that both have,
-    /// and nowhere else. Names: as in [`Surface::embedded`], after which this comes.
-    /// Errors: what cannot be read; `degenerate-edge`, `duplicate-wire`, `wire-contact`, `wire-too-near` name the edge and the place.
+    /// Each becomes an undivided edge of the mesh, in its place. Edges may touch each other, sheets and the surface only in vertices
+    /// that both have. Names: as in [`Surface::embedded`], which must be called first.
+    ///
+    /// Errors: a file that cannot be read; `degenerate-edge`, `duplicate-wire`, `wire-contact` and `wire-too-near` name the edge and the
+    /// place.
     pub fn embedded_edges(self, file: impl AsRef<Path>, name: Option<&str>) -> Result<Self, Error> {
         self.with_wires_of(file.as_ref(), WireKind::Edges, name)
     }
 
-    /// The same with the points of a file inside: `.csv` (x, y, z and a name), `.node`, `.obj` (`p`) or legacy `.vtk`.
+    /// Embeds the points of a file: `.csv` (x, y, z and a name), `.node`, `.obj` (`p`) or legacy `.vtk`.
     ///
-    /// Each becomes a vertex of the mesh that is not moved; a point on a triangle is one of its corners. Names and errors: as in
+    /// Each becomes a vertex of the mesh and is not moved. A point on a triangle must be one of its corners. Names and errors: as in
     /// [`Surface::embedded_edges`].
     pub fn embedded_points(
         self,
@@ -48,10 +52,12 @@ impl Surface {
         self.with_wires_of(file.as_ref(), WireKind::Points, name)
     }
 
-    /// [`Surface::embedded_edges`] of arrays: each edge is two positions in `points`.
+    /// Like [`Surface::embedded_edges`], from arrays.
     ///
-    /// Shape: `labels`, if given, runs parallel to `edges`; a name each. The store keeps a copy.
-    /// Errors: `index-out-of-range`, `not-a-number`, `count-mismatch` name the edge or the point; as for files.
+    /// Shape: each edge is two positions in `points`. `labels`, if given, runs parallel to `edges` and has a name for each. The store
+    /// keeps a copy.
+    ///
+    /// Errors: `index-out-of-range`, `not-a-number` and `count-mismatch` name the edge or the point; others as for files.
     pub fn embedded_edges_of(
         self,
         points: &[[f64; 3]],
@@ -71,7 +77,7 @@ impl Surface {
         self.with_set(&set, name)
     }
 
-    /// [`Surface::embedded_points`] of an array. Shape and errors: as in [`Surface::embedded_edges_of`].
+    /// Like [`Surface::embedded_points`], from an array. Shape and errors: as in [`Surface::embedded_edges_of`].
     pub fn embedded_points_of(
         self,
         points: &[[f64; 3]],
@@ -117,7 +123,7 @@ impl Surface {
         })
     }
 
-    /// Adds edges and points; `record`: where they can be read again, as long as nothing else changes.
+    /// Adds edges and points. `record` is the file to read them from again; it is used only while the store needs no copy.
     fn with_recorded(
         mut self,
         set: &EmbeddedSet,
@@ -138,7 +144,7 @@ impl Surface {
         Ok(self)
     }
 
-    /// Makes the store keep all of it, in the order in which that is read again.
+    /// Makes the store keep a copy of the whole surface, in the order in which the copy is read again.
     pub(super) fn keep_all(&mut self, scratch: &ScratchSpace) -> Result<(), Error> {
         if !self.inner.has_sheets() && !self.inner.has_embedded() {
             self.sources = vec![given(&self.inner)];
@@ -159,7 +165,7 @@ impl Surface {
         Ok(())
     }
 
-    /// Puts a copy of edges and points that are not in files of their own into the store's folder. Errors: the disk.
+    /// Writes a copy of edges and points that have no files of their own to the store's folder. Errors: the disk.
     pub(super) fn keep_wires_in(&self, store: &Path) -> Result<(), Error> {
         if self.keeps_embedded() {
             write::wires(&self.inner.embedded_set(), &in_store(store))?;
@@ -167,12 +173,12 @@ impl Surface {
         Ok(())
     }
 
-    /// Whether the store keeps a copy of the embedded edges and points.
+    /// Returns whether the store keeps a copy of the embedded edges and points.
     fn keeps_embedded(&self) -> bool {
         self.sources.iter().any(|s| matches!(s.origin, Origin::EmbeddedCopy(_)))
     }
 
-    /// Adds the copy of embedded edges and points in the store; `counts` has the number of each.
+    /// Adds the store's copy of embedded edges and points. `counts`: number of edges, number of points.
     pub(super) fn with_kept_wires(
         mut self,
         counts: [u64; 2],
@@ -190,12 +196,12 @@ impl Surface {
     }
 }
 
-/// Where a store keeps edges and points.
+/// Path of the copy of edges and points in a store.
 fn in_store(store: &Path) -> PathBuf {
     store.join("wires.obj")
 }
 
-/// What identifies edges and points that the store keeps.
+/// Identity of edges and points that the store keeps: their numbers and a hash.
 fn kept(set: &EmbeddedSet) -> Source {
     let mut hash = Xxh3::new();
     for x in set.points.iter().flat_map(|p| p.to_array()) {
@@ -219,7 +225,7 @@ fn set_of(points: &[[f64; 3]]) -> Result<EmbeddedSet, Error> {
     })
 }
 
-/// The number of each one's label, all of them `name` where there are none.
+/// The label of each edge or point, as a position in `set.label_names`. Without `labels`, all have the label `name`.
 fn labels_of(
     set: &mut EmbeddedSet,
     (n, what): (usize, &str),
@@ -237,7 +243,7 @@ fn labels_of(
     }
     let mut known = HashMap::new();
     let number = |label: &&str| {
-        // As it is read again from the store's copy, a line of which it is.
+        // The store's copy has one label a line; a label is trimmed as it is when the copy is read.
         let label = label.trim().replace(['\n', '\r'], " ");
         *known.entry(label.clone()).or_insert_with(|| {
             set.label_names.push(label);
@@ -268,7 +274,7 @@ mod tests {
         };
         let sizes = || Sizes::interior(Length::units(0.2));
         let store = mesh("a", sizes());
-        // From what the store keeps alone.
+        // The verification reads only the copies in the store.
         assert!(store.verify(VerifyLevel::Delaunay).unwrap().is_valid());
         assert_eq!(mesh("b", sizes()).summary().digest, store.summary().digest);
     }

@@ -1,4 +1,4 @@
-//! Files that a run writes are none that it reads.
+//! Protection of input files from being overwritten.
 
 use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
@@ -7,17 +7,17 @@ use super::Error;
 use tetdb_schema::source::Source;
 use tetdb_store::store::Catalog;
 
-/// Endings of files, and of those that are read with them: TetGen's points, the background mesh of sizes.
+/// File endings, and endings of the companion files read with them: TetGen's points, the background mesh of sizes.
 const READ: [(&str, &[&str]); 4] = [
     ("poly", &["node"]),
     ("smesh", &["node"]),
     ("sol", &["mesh", "meshb"]),
     ("solb", &["mesh", "meshb"]),
 ];
-/// The same of files that are written.
+/// File endings, and endings of the companion files written with them.
 const WRITTEN: [(&str, &[&str]); 1] = [("ele", &["node", "face", "edge"])];
 
-/// Refuses to write to `out` where that is a folder, or one of `inputs`, through whatever links; so too for what goes beside either.
+/// Refuses to write to `out` if it is a folder or one of `inputs`, also through links. Companion files of both are checked too.
 ///
 /// Errors: `usage`.
 pub fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
@@ -45,7 +45,7 @@ pub fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
     Ok(())
 }
 
-/// A file, and those that `others` name by its ending.
+/// A file, and the companion files that `others` lists for its ending.
 fn with_others(file: &Path, others: &[(&str, &[&str])]) -> Vec<PathBuf> {
     let ending = file.extension().unwrap_or_default().to_string_lossy();
     let others = others.iter().filter(|(of, _)| ending.eq_ignore_ascii_case(of));
@@ -53,7 +53,7 @@ fn with_others(file: &Path, others: &[(&str, &[&str])]) -> Vec<PathBuf> {
     [file.to_owned()].into_iter().chain(others).collect()
 }
 
-/// The files a store was made from.
+/// Lists the files that a store was made from.
 pub fn inputs_of(store: &Path) -> Vec<PathBuf> {
     let job = Catalog::open(store).and_then(|mut catalog| catalog.job());
     let sources = job.map(|job| job.surfaces).unwrap_or_default();
@@ -61,7 +61,7 @@ pub fn inputs_of(store: &Path) -> Vec<PathBuf> {
     sources.filter_map(|source| source.origin.file().map(PathBuf::from)).collect()
 }
 
-/// Whether two paths lead to one file.
+/// Returns whether two paths lead to the same file.
 fn is_same_file(a: &Path, b: &Path) -> bool {
     let (Ok(a_meta), Ok(b_meta)) = (a.metadata(), b.metadata()) else {
         return false;

@@ -1,4 +1,4 @@
-//! A mesh by tasks that a batch scheduler starts, each a process of its own on whatever machine.
+//! Meshing in tasks that a batch scheduler starts. Each task is a process of its own, on any machine.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -11,14 +11,14 @@ use crate::pipeline::{self, Performed, TASKS_MAX, TaskSettings};
 use tetdb_base::storage::{Budget, host_name};
 use tetdb_store::store::Catalog;
 
-/// How long a file may be late by default: file systems of clusters keep for up to a minute what they know of a folder.
+/// Default time that an expected file may be late. Cluster file systems may cache the contents of a folder for up to a minute.
 const WAIT: Duration = Duration::from_secs(60);
 
-/// The work that is left of an unfinished store, as tasks.
+/// The remaining work of an unfinished store, divided into tasks.
 ///
-/// One process makes the coarse mesh ([`Mesher::coarse_only`](super::Mesher::coarse_only)) and plans; then each stage's tasks run in any
-/// order, on any machines that see the store's folder, as often as anybody likes; between stages one process gathers. The mesh is that of one
-/// process.
+/// One process creates the coarse mesh ([`Mesher::coarse_only`](super::Mesher::coarse_only)) and plans the tasks. The tasks of a stage
+/// run in any order, on any machines that share the store's folder, and may be repeated. Between stages, one process gathers their
+/// results. The mesh is the same as that of a single process.
 ///
 /// ```
 /// # use tetdb_engine::api as tetdb;
@@ -46,7 +46,7 @@ pub struct Tasks {
 }
 
 impl Tasks {
-    /// Of the store at `path`.
+    /// Tasks of the store at `path`.
     pub fn of(path: impl AsRef<Path>) -> Self {
         Self {
             store: path.as_ref().to_owned(),
@@ -55,27 +55,29 @@ impl Tasks {
         }
     }
 
-    /// Memory, threads, progress of each call.
+    /// Sets memory, threads and progress of each call.
     pub fn settings(mut self, settings: Settings) -> Self {
         self.settings = settings;
         self
     }
 
-    /// A folder of this machine where tasks write before they copy. Default: they write in the store's folder.
+    /// Sets a local folder where tasks write files before copying them to the store. Default: tasks write in the store's folder.
     pub fn scratch(mut self, dir: impl AsRef<Path>) -> Self {
         self.how.scratch = Some(dir.as_ref().to_owned());
         self
     }
 
-    /// How long a file that is expected may be late. Default: a minute.
+    /// Sets how long an expected file may be late. Default: one minute.
     pub fn wait(mut self, wait: Duration) -> Self {
         self.how.wait = wait;
         self
     }
 
-    /// Plans for about `n` tasks at once, at most 1,000 a stage; the tasks that can be done now. The same plan again changes nothing.
+    /// Plans for about `n` concurrent tasks, at most 1,000 a stage. Returns the tasks that can run now.
     ///
-    /// Errors: `no-tasks` when the store is finished or has no coarse mesh; `busy`; `usage`.
+    /// Repeating the same plan changes nothing.
+    ///
+    /// Errors: `no-tasks` if the store is finished or has no coarse mesh; `busy`; `usage`.
     pub fn plan(&self, n: u32) -> Result<Vec<u32>, Error> {
         if !(1..=TASKS_MAX).contains(&n) {
             let message = format!("{n} tasks cannot be planned");
@@ -90,9 +92,9 @@ impl Tasks {
         })
     }
 
-    /// Does a task; `false` when it had been done before. The store's catalog is not opened.
+    /// Runs a task. Returns `false` if the task was already done. The store's catalog is not opened.
     ///
-    /// Errors: `no-tasks` while the stage of the task has not come; `task-file`; those of a run, with the name of this machine.
+    /// Errors: `no-tasks` if the stage of the task has not begun; `task-file`; errors of a run, with the name of this machine.
     pub fn run(&self, task: u32) -> Result<bool, Error> {
         guarded(&self.settings, || {
             let budget = Budget::new(self.settings.cap()?);
@@ -107,15 +109,15 @@ impl Tasks {
         })
     }
 
-    /// Commits what tasks have done. The tasks that can be done now, or `None` when the store is finished.
+    /// Commits the results of tasks. Returns the tasks that can run now, or `None` if the store is finished.
     ///
-    /// Errors: `tasks-left` when some of the stage have to be done again, with their numbers; `no-tasks`; `busy`.
+    /// Errors: `tasks-left` with the numbers of tasks of the stage that must be repeated; `no-tasks`; `busy`.
     pub fn gather(&self) -> Result<Option<Vec<u32>>, Error> {
         let gathered = self.gather_reported()?;
         Ok((!gathered.finished).then_some(gathered.next))
     }
 
-    /// [`Tasks::gather`], with everything that was done. Errors: as there.
+    /// Like [`Tasks::gather`], with a report. Errors: as [`Tasks::gather`].
     pub fn gather_reported(&self) -> Result<GatherReport, Error> {
         guarded(&self.settings, || {
             let mut catalog = self.open()?;
@@ -142,7 +144,7 @@ impl Tasks {
         })
     }
 
-    /// How far the tasks are; `None` where none are planned. Nothing is changed. Errors: damage.
+    /// Reports the progress of the tasks; `None` if none are planned. Nothing is changed. Errors: damage.
     pub fn status(&self) -> Result<Option<TaskStatus>, Error> {
         Ok(pipeline::status(&self.store)?.map(TaskStatus::from))
     }

@@ -1,16 +1,16 @@
-//! How far the tasks of a store are.
+//! Progress of the tasks of a store.
 
 use crate::pipeline::{Gathered, Planned, Stage, StageKind, TaskState};
 use serde::Serialize;
 use std::ops::Range;
 
-/// The plan of a store and how far its tasks are; see [`Tasks::status`](super::Tasks::status).
+/// The plan of a store and the progress of its tasks; see [`Tasks::status`](super::Tasks::status).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct TaskStatus {
     /// Sub-domains of the mesh.
     pub subdomains: u32,
-    /// Tasks at once, as planned.
+    /// Planned number of concurrent tasks.
     pub tasks: u32,
     /// Position of the current stage in `stages`.
     pub stage: usize,
@@ -18,7 +18,7 @@ pub struct TaskStatus {
     pub stages: Vec<TaskStage>,
     /// Tasks of the current stage that are done.
     pub done: usize,
-    /// Tasks that run.
+    /// Tasks that are running.
     pub running: usize,
     /// Tasks that ended without a result.
     pub failed: usize,
@@ -30,7 +30,7 @@ pub struct TaskStatus {
     pub states: Vec<TaskReport>,
 }
 
-/// Tasks that can run at once, each after all tasks of the stages before.
+/// Tasks that can run at once, after all tasks of the earlier stages.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct TaskStage {
     /// The work of each task, in words.
@@ -42,7 +42,7 @@ pub struct TaskStage {
 }
 
 impl TaskStage {
-    /// Numbers of its tasks.
+    /// Numbers of the tasks of this stage.
     pub fn range(&self) -> Range<u32> {
         self.first_task..self.first_task + self.tasks
     }
@@ -51,15 +51,15 @@ impl TaskStage {
 /// One task of the current stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TaskReport {
-    /// Its number.
+    /// Number of the task.
     pub task: u32,
     /// `waiting`, `running`, `failed` or `done`.
     pub state: &'static str,
-    /// The machine that runs it.
+    /// Machine that runs the task.
     pub host: Option<String>,
-    /// The place and reason of a failure.
+    /// Place and reason of the failure.
     pub why: Option<String>,
-    /// Seconds that it took.
+    /// Run time in seconds.
     pub wall_s: Option<f64>,
 }
 
@@ -71,7 +71,7 @@ pub struct GatherReport {
     pub committed: Vec<u32>,
     /// Tasks that can run now.
     pub next: Vec<u32>,
-    /// Number of their stage, from 0.
+    /// Number of the stage of these tasks, from 0.
     pub stage: usize,
     /// Number of stages.
     pub stages: usize,
@@ -136,7 +136,7 @@ impl From<(u32, TaskState)> for TaskReport {
     }
 }
 
-/// Ascending numbers of tasks in the form of batch schedulers: `3,7-9`.
+/// Formats task numbers as batch schedulers do: `3,7-9`. The numbers must ascend.
 pub fn task_ranges(numbers: impl IntoIterator<Item = u32>) -> String {
     let mut ranges: Vec<[u32; 2]> = Vec::new();
     for n in numbers {

@@ -1,4 +1,4 @@
-//! Is it a valid mesh of its surface?
+//! Verification of a mesh with exact signs.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,17 +15,19 @@ use tetdb_schema::catalog::StoreState;
 use tetdb_store::audit::{self, Level, Report};
 use tetdb_store::store::{Catalog, StoreError, WriterLock};
 
-/// How much is checked, each level with all before it.
+/// Extent of a verification. Each level includes the levels before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum VerifyLevel {
-    /// Positive volumes, faces paired, input triangles present, interfaces alike on both sides.
+    /// Positive volumes, paired faces, all input triangles present, interfaces equal on both sides.
     #[default]
     Geometry,
-    /// Also how many free faces are locally Delaunay.
+    /// Also counts the free faces that are locally Delaunay.
     Delaunay,
 }
 
-/// What a verification found. Serialized, it is the answer of `tetdb verify --json`; the guide lists the keys.
+/// Result of a verification.
+///
+/// Serialized, it is the answer of `tetdb verify --json`; the guide lists the keys.
 #[derive(Clone, Debug, Serialize)]
 #[serde(transparent)]
 pub struct Verification {
@@ -33,22 +35,22 @@ pub struct Verification {
 }
 
 impl Verification {
-    /// Whether nothing is wrong.
+    /// Returns whether the mesh is valid.
     pub fn is_valid(&self) -> bool {
         self.report.valid
     }
 
-    /// Tetrahedra that were checked.
+    /// Number of checked tetrahedra.
     pub fn n_tets(&self) -> u64 {
         self.report.tets
     }
 
-    /// What was checked, of a valid mesh, in one line.
+    /// Summary of the checks of a valid mesh, in one line.
     pub fn sentence(&self) -> String {
         sentence(&self.report)
     }
 
-    /// The error that says what is wrong with the mesh at `store`; none of a valid one.
+    /// Returns an error if the mesh at `store` is invalid.
     ///
     /// # Errors
     /// `invalid-mesh`, with the first offending tetrahedron.
@@ -56,14 +58,14 @@ impl Verification {
         if self.report.valid { Ok(()) } else { Err(invalid(&self.report, store)) }
     }
 
-    /// Kinds of what is wrong, in words, with how often each occurs.
+    /// Kinds of defects in words, with the number of each.
     pub fn findings(&self) -> Vec<(String, u64)> {
         let findings = self.report.findings.iter();
         findings.map(|(f, &n)| (format!("{f:?}"), n)).collect()
     }
 }
 
-/// Verifies within `cap`, less what the surface holds. What is damaged is noted, all of it.
+/// Verifies a mesh within `cap`, less the memory of the surface. If the store is damaged, all damage is reported as notes.
 pub(super) fn check(
     store: &mut Catalog,
     settings: &Settings,
@@ -85,7 +87,7 @@ pub(super) fn check(
     Err(error.into())
 }
 
-/// A valid report in one line.
+/// Summary of a valid report, in one line.
 pub(super) fn sentence(report: &Report) -> String {
     let mut text = format!(
         "verified: {} tetrahedra, all positive by exact signs; {} inner faces paired",
@@ -106,14 +108,14 @@ pub(super) fn sentence(report: &Report) -> String {
     if report.delaunay_tested > 0 {
         text += &format!(
             "; {} % of free faces locally Delaunay",
-            // Rounded down: 100 is said of all alone.
+            // Rounded down, so that only a share of 1 reads as 100 %.
             short((1e4 * report.delaunay_share()).floor() / 100.0)
         );
     }
     text
 }
 
-/// `NotAnInputTriangle` as `not an input triangle`.
+/// Splits a name into words: `NotAnInputTriangle` becomes `not an input triangle`.
 fn words_of(name: &str) -> String {
     let mut words = String::new();
     for c in name.chars() {
@@ -146,7 +148,7 @@ pub(super) fn invalid(report: &Report, path: &Path) -> Error {
     .with_remedy(Remedy::General)
 }
 
-/// Puts on record that a finished store was verified, which nobody else has changed meanwhile: `lock` was held.
+/// Records that a finished store was verified. `lock` was held throughout, so nobody else has changed the store.
 pub(super) fn record(path: &Path, lock: Arc<WriterLock>) -> Result<(), Error> {
     let mut catalog = Catalog::open_locked(path, lock)?;
     if catalog.state()? < StoreState::Verified {

@@ -1,6 +1,6 @@
-//! Sub-domains of a verification, looked at for another process, which adds up (`verify_shared`).
+//! Verification of single sub-domains for another process, which adds up the reports (see `verify_shared`).
 //!
-//! It takes the order, the file it names and the surface; the catalog is never opened.
+//! The server reads the order, the sub-domain's file and the surface. It never opens the catalog.
 
 use std::path::Path;
 use tetdb_schema::code::Code;
@@ -19,7 +19,7 @@ use tetdb_store::audit::{self, VerifyOptions};
 use tetdb_store::sealed::Subdomain;
 use tetdb_store::store::{Catalog, StoreError};
 
-/// Looks at sub-domains for a process that adds up.
+/// Verifies single sub-domains for another process.
 pub struct Server {
     job: Job,
     surface: Option<Surface>,
@@ -27,7 +27,9 @@ pub struct Server {
 }
 
 impl Server {
-    /// `None` where `job` is no verification. Effects: the surface is read. Errors: it is not the one that is compared with.
+    /// Starts a verification. Returns `None` if `job` is no verification.
+    ///
+    /// Effects: reads the surface. Errors: the surface differs from the one to compare with.
     pub fn begin(job: &[u8], settings: &Settings) -> Option<Result<Self, Error>> {
         let job: Job = from_bytes(WorkKind::Verification, job).ok()?;
         Some(Self::with(job, settings))
@@ -51,7 +53,7 @@ impl Server {
         Ok(Self { options: options(cap, surface.as_ref(), job.level), surface, job })
     }
 
-    /// Looks at one sub-domain. Errors: damage; the disk; an order that cannot be read.
+    /// Verifies one sub-domain. Errors: damage; the disk; an unreadable order.
     pub fn perform(&self, order: &[u8]) -> Result<Vec<u8>, Error> {
         let row: SubdomainRow = from_bytes(WorkKind::PartOrder, order).map_err(Error::internal)?;
         let found = attempt(|| {
@@ -77,11 +79,11 @@ mod tests {
     use tetdb_base::storage::RemoteFailure;
     use tetdb_store::audit::{Level, Report};
 
-    /// Helpers that are threads of this process.
+    /// Remote workers simulated by this process.
     #[derive(Default)]
     struct Threads {
         slots: usize,
-        /// A helper of which nothing works.
+        /// A worker that always fails.
         broken: Option<usize>,
         server: Mutex<Option<Arc<Server>>>,
         done: AtomicUsize,
@@ -120,7 +122,7 @@ mod tests {
         (path, surface.inner)
     }
 
-    /// The report, or the error, with so many helpers; and how many orders they did.
+    /// The report or the error of a verification with these workers, and the number of orders that they performed.
     fn found(
         path: &Path,
         surface: Option<&Surface>,
@@ -153,7 +155,7 @@ mod tests {
         }
         let broken = Threads { slots: 2, broken: Some(1), ..Threads::default() };
         assert_eq!(found(&path, Some(&surface), broken).0, Ok(one.clone()));
-        // Threads of this process have room within a greater cap.
+        // A larger cap leaves memory for several threads in this process.
         for n in [1, 2, 5] {
             let settings = Settings::new().memory(Bytes(2 << 30)).threads(n);
             let report = guarded(&settings, || {
@@ -163,7 +165,7 @@ mod tests {
             });
             assert_eq!(report.ok(), Some(one.clone()), "{n} threads");
         }
-        // What helpers would read is another surface: this process does it all.
+        // The workers would read a different surface, so this process verifies everything itself.
         let mut moved = surface;
         moved.points[0].x += 0.5;
         let threads = Threads { slots: 2, ..Threads::default() };
@@ -180,7 +182,7 @@ mod tests {
         let row = store.subdomains().expect("rows").swap_remove(1);
         let file = store.file_path(row.rank, row.generation);
         let mut bytes = std::fs::read(file.path()).expect("its file");
-        // A quarter: parts of a file hold nothing.
+        // A quarter of the file, because some parts of a file hold no data.
         let n = bytes.len();
         bytes[3 * n / 8..5 * n / 8].fill(0xa5);
         std::fs::write(file.path(), bytes).expect("its file");

@@ -1,6 +1,7 @@
-//! One verification by several threads and processes: each looks at sub-domains by itself, one adds up what they found.
+//! One verification by several threads and processes. Each verifies whole sub-domains, and one process adds up the reports.
 //!
-//! What another process (`verify_server`) cannot do or fails at is done here: the report and the error are those of one process.
+//! Work that another process (`verify_server`) refuses or fails at is done by this process. Report and error are the same as with a
+//! single process.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -19,34 +20,34 @@ use tetdb_base::surface::Surface;
 use tetdb_store::audit::{self, Level, PartReport, Report, VerifyOptions};
 use tetdb_store::store::{Catalog, StoreError};
 
-/// What is the same for all sub-domains.
+/// Parameters that are the same for all sub-domains.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug)]
 pub(super) struct Job {
     pub store: String,
     pub level: Level,
     pub apex: Option<[f64; 3]>,
-    /// What the mesh is compared with, if with anything: where it can be read, and its fingerprint.
+    /// The surface to compare with, if any: the sources to read it from, and its fingerprint.
     pub surface: Option<(Vec<SurfaceSource>, u64)>,
 }
 
-/// Verifies within `cap`, less what the surface holds.
+/// Options for verifying within `cap`, less the memory of the surface.
 pub(super) fn options(cap: u64, surface: Option<&Surface>, level: Level) -> VerifyOptions {
     let held = surface.map_or(0, |s| s.bytes() as u64 + audit::wire_bytes(s));
     let memory = cap.saturating_sub(held).min(1 << 30) / 2;
     VerifyOptions { level, memory_bytes: memory as usize, temp_dir: std::env::temp_dir() }
 }
 
-/// Bytes for each thread that looks at sub-domains: a second one took 24 to 66 MiB where there was room.
+/// Memory for each thread that verifies sub-domains. A second thread took 24 to 66 MiB when memory was not short.
 const THREAD_BYTES: u64 = 64 << 20;
 
-/// Threads of this process that look at sub-domains side by side.
+/// Number of threads of this process that verify sub-domains at once.
 fn threads(n_subdomains: usize, surface: Option<&Surface>, options: &VerifyOptions) -> usize {
     let each = THREAD_BYTES + surface.map_or(0, audit::wire_bytes);
     let room = options.memory_bytes as u64 / each;
     n_threads().min(n_subdomains).min(room as usize).max(1)
 }
 
-/// Verifies, with several threads and with the other processes of `settings` if there are any. Errors: as [`audit::verify`].
+/// Verifies with several threads, and with the other processes of `settings` if any. Errors: as [`audit::verify`].
 pub(super) fn verify(
     store: &mut Catalog,
     settings: &Settings,
@@ -95,12 +96,13 @@ pub(super) fn verify(
     })
 }
 
-/// What is found of a sub-domain.
+/// Report on one sub-domain.
 type PartResult = Result<PartReport, StoreError>;
-/// Who looks at one, by number.
+/// A worker: verifies one sub-domain, on the thread or remote worker of this number.
 type Look<'a> = &'a (dyn Fn(usize, &SubdomainRow) -> PartResult + Sync);
 
-/// Has each of `rows` looked at, by so many here and so many elsewhere; `add` takes what was found in their order.
+/// Distributes `rows` over `n_here` threads of this process and `n_elsewhere` remote workers. Calls `add` with the reports in the order
+/// of `rows`.
 fn share(
     rows: &[SubdomainRow],
     [n_here, n_elsewhere]: [usize; 2],
@@ -123,7 +125,7 @@ fn share(
         }
         Ok(Vec::new())
     };
-    // The last of the list is taken first.
+    // Jobs are taken from the end of the list.
     let jobs = (0..rows.len()).rev().collect();
     let done = work_off(jobs, &hands, &|_| (), &mut commit);
     done.map_err(|error| match error {
@@ -132,13 +134,13 @@ fn share(
     })
 }
 
-/// Has a sub-domain looked at by a helper. Errors: in words.
+/// Lets a remote worker verify a sub-domain. Errors: a message.
 fn ask(helpers: &dyn Helpers, slot: usize, row: &SubdomainRow) -> Result<PartReport, String> {
     let answer = helpers.perform(slot, to_bytes(WorkKind::PartOrder, row));
     from_bytes(WorkKind::PartReport, &answer.map_err(|e| e.message)?)
 }
 
-/// Of all that a mesh is compared with.
+/// Hash of all parts of a surface that a mesh is compared with.
 pub(super) fn fingerprint(surface: &Surface) -> u64 {
     let mut sum = Xxh3::new();
     let mut put = |words: &mut dyn Iterator<Item = u32>| {

@@ -1,4 +1,4 @@
-//! Meshes a surface from arrays into the store named first, one run cancelled and the next finished, and asks for what is in a box.
+//! Meshes a surface from arrays into the store given as the first argument. One run is cancelled, the next finishes. Then queries a box.
 use tetdb::{CancelToken, Length, Mesher, Sizes, Surface};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

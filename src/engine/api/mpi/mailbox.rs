@@ -1,7 +1,7 @@
 //! Messages between ranks.
 //!
-//! One thread of each process calls MPI and looks for messages with pauses, so that a process that waits burns no core. A message is sent
-//! while others are received, so that two processes that send to each other never wait for each other.
+//! One thread of each process calls MPI. It polls for messages with pauses, so that a waiting process does not occupy a core. It also
+//! receives messages while it sends one, so that two processes that send to each other cannot deadlock.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -18,7 +18,7 @@ use crate::api::Code;
 use tetdb_base::storage::{RunContext, host_name};
 use tetdb_io::write::Share;
 
-/// Tag of jobs, their answers and the end; the tags of orders are above it.
+/// Tag of jobs, of their answers and of the last message. The tags of orders are larger.
 pub const CONTROL: i32 = 0;
 /// Tag of messages about a file that all ranks write.
 pub const FILE: i32 = 32_000;
@@ -28,7 +28,7 @@ pub const DONE: u8 = 0;
 pub const END: u8 = 1;
 /// First byte of an error.
 const FAILED: u8 = 2;
-/// Pauses between two looks for messages: short while they come, longer when none has come for a while.
+/// Pauses between two polls: short while messages arrive, longer when none has arrived for a while.
 const PAUSE_LEAST: Duration = Duration::from_micros(200);
 pub const PAUSE_MOST: Duration = Duration::from_millis(20);
 
@@ -47,9 +47,9 @@ struct Inbox {
     arrived: Condvar,
 }
 
-/// The messages of this process.
+/// Outgoing and received messages of this process.
 pub struct Mailbox {
-    /// Number of this process.
+    /// Rank of this process.
     pub rank: i32,
     /// Number of processes.
     pub size: i32,
@@ -60,7 +60,7 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// Starts MPI. A process that no launcher has started is rank 0 of 1.
+    /// Starts MPI. A process that was started without a launcher is rank 0 of 1.
     pub fn open() -> Self {
         let (out, outgoing) = channel();
         let (ready, started) = channel();
@@ -76,7 +76,7 @@ impl Mailbox {
         1..self.size
     }
 
-    /// The share of this rank of work that all ranks do.
+    /// The share of this rank in work that is divided among all ranks.
     pub fn share(&self) -> Share {
         Share { number: self.rank as u32 + 1, of: self.size as u32 }
     }
@@ -84,12 +84,12 @@ impl Mailbox {
     pub fn send(&self, to: i32, tag: i32, bytes: Vec<u8>) {
         let out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(out) = &*out {
-            // The thread lives until this is gone.
+            // The thread lives until this sender is dropped.
             let _ = out.send(Message { to, tag, bytes });
         }
     }
 
-    /// Waits for a message that `wanted` takes. Returns `None` once this run is cancelled, if `stops` is true.
+    /// Waits for a message that `wanted` accepts. If `stops` is true, returns `None` once this run is cancelled.
     fn receive<T>(&self, stops: bool, wanted: impl Fn(&mut Boxes) -> Option<T>) -> Option<T> {
         let mut boxes = (self.inbox.boxes.lock()).unwrap_or_else(PoisonError::into_inner);
         loop {
@@ -104,23 +104,23 @@ impl Mailbox {
         }
     }
 
-    /// A message of one rank, or `None` when the run is cancelled.
+    /// Waits for a message of one rank; `None` if the run is cancelled.
     pub fn receive_from(&self, rank: i32, tag: i32) -> Option<Vec<u8>> {
         self.receive(true, |boxes| boxes.get_mut(&(rank, tag))?.pop_front())
     }
 
-    /// The next message of rank 0 with its tag, orders before the end.
+    /// Waits for the next message of rank 0 and returns it with its tag. Orders come before the end.
     pub fn receive_any(&self) -> (i32, Vec<u8>) {
         let first = |boxes: &mut Boxes| {
             let mut full = boxes.iter_mut().filter(|(_, list)| !list.is_empty());
-            // Orders have the higher tags.
+            // Orders have the larger tags.
             let (&(_, tag), list) = full.next_back()?;
             Some((tag, list.pop_front()?))
         };
         self.receive(false, first).unwrap_or((CONTROL, vec![END]))
     }
 
-    /// Ends the thread, which waits for those of all other ranks.
+    /// Ends the thread, after the threads of all other ranks are ready to end.
     pub fn close(&self) {
         *self.out.lock().unwrap_or_else(PoisonError::into_inner) = None;
         let thread = (self.thread.lock()).unwrap_or_else(PoisonError::into_inner).take();
@@ -130,7 +130,7 @@ impl Mailbox {
     }
 }
 
-/// An error as a message, with the name of this machine.
+/// Encodes an error as a message, with the name of this machine.
 pub fn failed(code: Code, message: &str) -> Vec<u8> {
     let text = json!({ "code": code, "message": format!("{message} (on {})", host_name()) });
     [vec![FAILED], text.to_string().into_bytes()].concat()
@@ -138,7 +138,7 @@ pub fn failed(code: Code, message: &str) -> Vec<u8> {
 
 /// Sends and receives until the mailbox is closed.
 fn carry(ready: &Sender<[i32; 2]>, outgoing: &Receiver<Message>, inbox: &Inbox) {
-    // Dropped at the end of the thread, which waits for all others to end.
+    // Dropped at the end of the thread, which waits for all other ranks to end.
     let Some((universe, _)) = mpi::initialize_with_threading(Threading::Funneled) else {
         return;
     };
@@ -162,7 +162,7 @@ fn carry(ready: &Sender<[i32; 2]>, outgoing: &Receiver<Message>, inbox: &Inbox) 
     }
 }
 
-/// Puts a message that has arrived into the inbox. Returns true if there was one.
+/// Moves an arrived message into the inbox. Returns whether there was one.
 fn receive_one(world: &SimpleCommunicator, inbox: &Inbox) -> bool {
     let Some((message, status)) = world.any_process().immediate_matched_probe() else {
         return false;

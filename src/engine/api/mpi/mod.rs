@@ -1,4 +1,4 @@
-//! Ranks of an MPI program share a mesh: rank 0 runs as one process does, the others perform orders that come as messages.
+//! Meshing by the ranks of an MPI program. Rank 0 runs like a single process; the other ranks perform orders that it sends.
 //!
 //! Reading order: `mailbox` (messages between ranks), `rank_workers` (the other ranks as workers of rank 0), `shared_file` (a file that
 //! all ranks write), `ranks`.

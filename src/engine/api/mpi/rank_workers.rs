@@ -9,10 +9,10 @@ use crate::api::Code;
 use crate::pipeline::Helpers;
 use tetdb_base::storage::RemoteFailure;
 
-/// The other ranks.
+/// All ranks other than 0, as workers.
 pub struct RankWorkers {
     mailbox: Arc<Mailbox>,
-    /// Of each worker: its rank, and its number there.
+    /// For each worker: its rank, and its number within that rank.
     slots: Mutex<Vec<(i32, i32)>>,
 }
 
@@ -35,7 +35,7 @@ impl RankWorkers {
         Ok(())
     }
 
-    /// Waits for the answer of each rank, whatever one of them says, so that none sends to a process that has ended.
+    /// Waits for the answers of all ranks, even if one of them is an error, so that no rank sends to a process that has ended.
     pub fn answers(&self, tag: i32) -> Vec<Result<Vec<u8>, RemoteFailure>> {
         self.mailbox.others().map(|rank| self.answer(rank, tag)).collect()
     }
@@ -68,7 +68,7 @@ impl Helpers for RankWorkers {
             let n = answer?.first_chunk().map_or(0, |&n| u32::from_le_bytes(n));
             slots.extend((0..n as i32).map(|slot| (rank, slot)));
         }
-        // One order of each rank before the second of any.
+        // Each rank gets one order before any rank gets a second.
         slots.sort_by_key(|&(rank, slot)| (slot, rank));
         let n = slots.len();
         *self.slots() = slots;

@@ -1,4 +1,4 @@
-//! This process among the ranks of an MPI program.
+//! The ranks of an MPI program.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,9 +15,9 @@ use crate::api::{Code, Error, Settings, guarded};
 use crate::pipeline::{self, Hands, PipelineError, TaskSettings};
 use tetdb_io::write::{Share, Writers};
 
-/// This process among the ranks of an MPI program; clones are the same process.
+/// The rank of this process in an MPI program. Clones stand for the same process.
 ///
-/// Rank 0 meshes, resumes or verifies with [`Ranks::share_work`]; all other ranks [serve](Ranks::serve) it. At the end each rank calls
+/// Rank 0 meshes, resumes or verifies with [`Ranks::share_work`]; all other ranks call [`Ranks::serve`]. At the end, each rank calls
 /// [`Ranks::end`].
 #[derive(Clone)]
 pub struct Ranks {
@@ -26,7 +26,7 @@ pub struct Ranks {
 }
 
 impl Ranks {
-    /// Starts MPI; `None` where no launcher has started this program. To be called once.
+    /// Starts MPI; `None` if this program was started without a launcher. Call it only once.
     ///
     /// Errors: `usage` if the launcher belongs to another MPI.
     pub fn begin() -> Result<Option<Self>, Error> {
@@ -47,22 +47,22 @@ impl Ranks {
         Ok(Some(Self { mailbox, workers }))
     }
 
-    /// True if this is rank 0.
+    /// Returns whether this is rank 0.
     pub fn is_first(&self) -> bool {
         self.mailbox.rank == 0
     }
 
-    /// True if there are no other ranks.
+    /// Returns whether there are no other ranks.
     pub fn is_alone(&self) -> bool {
         self.mailbox.size == 1
     }
 
-    /// The share of this rank of work that all ranks do; see [`ExportOptions::share`](crate::api::ExportOptions::share).
+    /// The share of this rank in work divided among all ranks; see [`ExportOptions::share`](crate::api::ExportOptions::share).
     pub fn share(&self) -> Share {
         self.mailbox.share()
     }
 
-    /// A run of rank 0 with these settings uses the other ranks, which [serve](Self::serve) it.
+    /// Lets a run of rank 0 with these settings use the other ranks, which must call [`serve`](Self::serve).
     pub fn share_work(&self, mut settings: Settings) -> Settings {
         if self.is_first() && !self.is_alone() {
             settings.hands = Hands(Some(self.workers.clone()));
@@ -70,14 +70,14 @@ impl Ranks {
         settings
     }
 
-    /// One file that all ranks write, for [`Store::export_together`](crate::api::Store::export_together).
+    /// A file that all ranks write together, for [`Store::export_together`](crate::api::Store::export_together).
     pub fn shared_file(&self) -> Box<dyn Writers> {
         Box::new(SharedFile::new(self.mailbox.clone(), self.workers.clone()))
     }
 
-    /// Sends a result to rank 0, which returns the results of all others, by rank; other ranks return an empty list.
+    /// Sends a result to rank 0. Returns the results of all other ranks, by rank, on rank 0, and an empty list on other ranks.
     ///
-    /// `mine` may be an error with its message. Errors: of another rank, after all have answered.
+    /// `mine` may be an error with its message. Errors: an error of another rank, returned after all ranks have answered.
     pub fn gather<T: Serialize + DeserializeOwned>(
         &self,
         mine: Result<&T, (Code, &str)>,
@@ -97,9 +97,9 @@ impl Ranks {
         answers.map(|answer| parse(answer.map_err(PipelineError::from)?)).collect()
     }
 
-    /// Performs the orders of rank 0 until it ends. `begin` gives the settings of each job, or an error with its message.
+    /// Performs the orders of rank 0 until it ends. `begin` returns the settings of each job, or an error with its message.
     ///
-    /// Files are first written in `scratch`, a folder of this machine; by default in the store's folder.
+    /// Files are first written in `scratch`, a local folder. Default: the store's folder.
     pub fn serve(
         &self,
         scratch: Option<PathBuf>,
@@ -158,7 +158,7 @@ impl Ranks {
         Ok(end)
     }
 
-    /// Ends this rank, and waits for all others; rank 0 lets them end.
+    /// Ends this rank after all other ranks. Rank 0 lets the others end.
     pub fn end(&self) {
         if self.is_first() {
             self.mailbox.others().for_each(|rank| self.mailbox.send(rank, CONTROL, vec![END]));
@@ -167,7 +167,7 @@ impl Ranks {
     }
 }
 
-/// How many processes a launcher says it has started.
+/// Number of processes, as reported by a launcher; `None` without a launcher.
 fn launched() -> Option<i32> {
     let number = |name| std::env::var(name).ok()?.parse().ok();
     let sizes = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].map(number);

@@ -1,4 +1,4 @@
-//! A file that all ranks write together, each its partitions.
+//! A file that all ranks write together, each its own partitions.
 
 use std::cell::Cell;
 use std::ffi::OsStr;
@@ -12,7 +12,7 @@ use super::rank_workers::RankWorkers;
 use tetdb_base::storage::RemoteFailure;
 use tetdb_io::write::{Share, Writers};
 
-/// How long files of other machines may be late.
+/// Longest delay until files of other machines become visible.
 pub const WAIT: Duration = Duration::from_secs(60);
 
 pub struct SharedFile {
@@ -45,7 +45,7 @@ impl Writers for SharedFile {
     fn hear(&self) -> Option<PathBuf> {
         let message = self.mailbox.receive_from(0, FILE)?;
         let path = PathBuf::from(OsStr::from_bytes(message.strip_prefix(&[DONE])?));
-        // A file of another machine may be late.
+        // A file of another machine may become visible late.
         let begun = Instant::now();
         while !path.exists() && begun.elapsed() < WAIT {
             std::thread::sleep(PAUSE_MOST);
@@ -62,13 +62,13 @@ impl Writers for SharedFile {
     }
 
     fn wait(&self) -> Result<(), RemoteFailure> {
-        // All have answered before the first error is returned: none writes any more when the file goes.
+        // All ranks have answered before the first error is returned, so that none writes when the file is removed.
         self.workers.answers(FILE).into_iter().try_for_each(|done| done.map(drop))
     }
 }
 
 impl Drop for SharedFile {
-    /// Where rank 0 failed before there was a file, the others wait for none.
+    /// If rank 0 failed before it created the file, tells the other ranks not to wait for it.
     fn drop(&mut self) {
         if self.mailbox.rank == 0 && !self.is_announced.get() {
             self.announce_to_all(&[END]);
