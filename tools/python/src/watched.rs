@@ -60,9 +60,12 @@ impl Listener<'_> {
                 Event::Note(text) => say(py, callable, "note", &text)?,
                 Event::Warning(text) => say(py, callable, "warning", &text)?,
                 Event::SizeWarning(warning) => say(py, callable, "warning", &warning.to_string())?,
-                Event::SurfaceMissing => {
-                    say(py, callable, "note", "the surface is not where it was; the mesh is verified without it")?
-                }
+                Event::SurfaceMissing => say(
+                    py,
+                    callable,
+                    "note",
+                    "the surface is not where it was; the mesh is verified without it",
+                )?,
                 Event::StoreBegun(path) => say(py, callable, "store", &path.to_string_lossy())?,
                 _ => continue,
             };
