@@ -18,7 +18,6 @@ use tetdb_schema::source::Source;
 use tetdb_store::store::Catalog;
 
 /// Builds the job record of a run.
-#[doc(hidden)]
 pub fn job(options: &MeshOptions, surfaces: &[Source]) -> Job {
     Job {
         options: serde_json::to_string(options).unwrap_or_default(),
@@ -28,7 +27,6 @@ pub fn job(options: &MeshOptions, surfaces: &[Source]) -> Job {
 }
 
 /// The recorded options of a store. Errors: `damaged`.
-#[doc(hidden)]
 pub fn options_of(job: &Job, store: &Path) -> Result<MeshOptions, Error> {
     serde_json::from_str(&job.options).map_err(|e| {
         Error::new(Code::Damaged, format!("the job's options cannot be read: {e}"))
@@ -37,7 +35,6 @@ pub fn options_of(job: &Job, store: &Path) -> Result<MeshOptions, Error> {
 }
 
 /// Returns whether a job gives the same mesh as these options and surfaces.
-#[doc(hidden)]
 pub fn is_same(job: &Job, options: &MeshOptions, surfaces: &[Source]) -> bool {
     let same = serde_json::from_str::<MeshOptions>(&job.options).is_ok_and(|mut o| {
         // Kept snapshots and the storage form do not affect the mesh.
@@ -50,7 +47,6 @@ pub fn is_same(job: &Job, options: &MeshOptions, surfaces: &[Source]) -> bool {
 }
 
 /// Refuses to continue a store that another version of the recipe began, because the result would follow neither version.
-#[doc(hidden)]
 pub fn check_recipe(catalog: &mut Catalog) -> Result<(), Error> {
     let found = recipe_of(catalog)?;
     if found == RECIPE {
@@ -65,7 +61,6 @@ pub fn check_recipe(catalog: &mut Catalog) -> Result<(), Error> {
 }
 
 /// Completes the record of the size file: its full path and the hash of its contents.
-#[doc(hidden)]
 pub fn identify_sizes(options: &mut MeshOptions) -> Result<(), Error> {
     // Sizes from arrays already have a hash.
     let Some(file) = options.size_field.as_mut().filter(|file| !is_in_store(&file.path)) else {
@@ -81,7 +76,6 @@ pub fn identify_sizes(options: &mut MeshOptions) -> Result<(), Error> {
 /// Adds the seeds of the surface's files to the options, so that the record is complete.
 ///
 /// Under the rule `seeds` they count like the user's seeds. Under any other rule, only their names are used.
-#[doc(hidden)]
 pub fn take_seeds(options: &mut MeshOptions, seeds: &[Seed]) {
     let is_rule = options.regions.policy == RegionPolicy::Seeds;
     for seed in seeds {
@@ -99,7 +93,6 @@ pub fn take_seeds(options: &mut MeshOptions, seeds: &[Seed]) {
 /// Reads the size file of identified options, in at most half of `cap`. Sizes that were given as arrays are in `store`.
 ///
 /// Errors: `size-field-changed` if the contents of the files differ from the record.
-#[doc(hidden)]
 pub fn read_background(
     options: &MeshOptions,
     store: &Path,

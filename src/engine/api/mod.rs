@@ -31,14 +31,11 @@ mod condition;
 mod defects;
 #[doc(hidden)]
 pub mod error;
-#[doc(hidden)]
-pub mod field_arrays;
+mod field_arrays;
 mod from_errors;
-#[doc(hidden)]
-pub mod guard;
+mod guard;
 mod info;
-#[doc(hidden)]
-pub mod job;
+mod job;
 mod located;
 mod memory;
 mod mesher;
@@ -46,25 +43,20 @@ mod mesher;
 pub mod mpi;
 mod names;
 mod options;
-#[doc(hidden)]
-pub mod page;
+mod page;
 mod picture;
 mod prediction;
-#[doc(hidden)]
-pub mod preflight;
+mod preflight;
 mod remesh;
 mod remesh_sizes;
-#[doc(hidden)]
-pub mod replace;
+mod replace;
 mod resume;
 mod settings;
 mod show;
 mod sizes;
-#[doc(hidden)]
-pub mod store;
+mod store;
 mod suggestions;
-#[doc(hidden)]
-pub mod surface;
+mod surface;
 mod surface_arrays;
 mod surface_limits;
 mod surface_repair;
@@ -74,8 +66,7 @@ mod surface_wires;
 pub mod targets;
 mod tasks;
 mod tasks_status;
-#[doc(hidden)]
-pub mod verify;
+mod verify;
 #[cfg(any(test, feature = "mpi"))]
 mod verify_server;
 mod verify_shared;
@@ -98,9 +89,8 @@ pub use memory::peak_bytes;
 #[doc(hidden)]
 pub use memory::show_bytes;
 pub use memory::{Bytes, MEMORY_LEAST};
+use mesher::predict;
 pub use mesher::{Created, Existing, Mesher, PageTraffic};
-#[doc(hidden)]
-pub use mesher::{divide, predict};
 pub use options::{Length, Optimize, Regions, Seal, Subdomains, typed};
 pub use page::{Reported, ShownTriangles};
 pub use picture::{ColorBy, Snapped, Snapshot};

@@ -14,7 +14,6 @@ use tetdb_base::surface::Surface;
 const REFUSED_BELOW: f64 = 0.7;
 
 /// The part of `cap` that a surface leaves free, with scratch files in the folder that holds the store.
-#[doc(hidden)]
 pub fn scratch_beside(surface: &Surface, cap: u64, store: &Path) -> Result<ScratchSpace, Error> {
     let folder = folder_of(store)
         .ok_or_else(|| Error::new(Code::Io, "there is no folder above it").at(store.display()))?;
@@ -22,7 +21,6 @@ pub fn scratch_beside(surface: &Surface, cap: u64, store: &Path) -> Result<Scrat
 }
 
 /// Refuses a surface that leaves too little of `cap`, before any work on it.
-#[doc(hidden)]
 pub fn surface_fits(surface: &Surface, cap: u64) -> Result<(), Error> {
     let least = pipeline::least_for(surface);
     if cap >= least {
@@ -37,7 +35,6 @@ pub fn surface_fits(surface: &Surface, cap: u64) -> Result<(), Error> {
 }
 
 /// Refuses a mesh that memory or disk cannot hold.
-#[doc(hidden)]
 pub fn preflight(
     estimate: &Estimate,
     cap: u64,
@@ -81,7 +78,6 @@ pub fn preflight(
 
 /// Adds the free disk space to an error of a full disk. With `needed`, the predicted bytes of the whole run, also adds the bytes
 /// missing.
-#[doc(hidden)]
 pub fn with_free_space(mut error: Error, store: &Path, needed: Option<u64>) -> Error {
     if let (Code::DiskFull, Some(free)) = (error.code(), free_at(store)) {
         error.add(&format!("; {} are free", show_bytes(free)));
@@ -115,7 +111,6 @@ fn folder_of(store: &Path) -> Option<PathBuf> {
 }
 
 /// Free bytes on the disk of a store.
-#[doc(hidden)]
 pub fn free_at(store: &Path) -> Option<u64> {
     available_bytes(&folder_of(store)?)
 }

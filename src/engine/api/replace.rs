@@ -12,7 +12,6 @@ use tetdb_schema::catalog::StoreState;
 use tetdb_store::store::{Catalog, StoreError, WriterLock};
 
 /// Path where the new store is built.
-#[doc(hidden)]
 pub fn new_of(path: &Path) -> PathBuf {
     beside(path, "being-made")
 }
@@ -35,7 +34,6 @@ fn state(path: &Path) -> Option<StoreState> {
 }
 
 /// Returns whether an unfinished replacement of the store at `path` exists.
-#[doc(hidden)]
 pub fn is_begun(path: &Path) -> bool {
     state(&new_of(path)).is_some()
 }
@@ -43,7 +41,6 @@ pub fn is_begun(path: &Path) -> bool {
 /// Completes an interrupted exchange; all names are right afterwards.
 ///
 /// Errors: the disk; `busy` while another run holds the lock of the new store, which it keeps until all names are right.
-#[doc(hidden)]
 pub fn settle(path: &Path, settings: &Settings) -> Result<(), Error> {
     let (new, old) = (new_of(path), old_of(path));
     let places = [&new, path, &old];
@@ -82,7 +79,6 @@ pub fn settle(path: &Path, settings: &Settings) -> Result<(), Error> {
 /// Opens a begun replacement for writing if it has the same job; otherwise removes it.
 ///
 /// Errors: the disk; another process writes it; it is no store, or damaged. Nothing is removed in these cases.
-#[doc(hidden)]
 pub fn take_up(
     path: &Path,
     is_same: impl FnOnce(&mut Catalog) -> bool,
@@ -108,7 +104,6 @@ pub fn take_up(
 /// Puts the new store in the place of the old one. The new store is sealed and closed, and its lock is held.
 ///
 /// Errors: the disk.
-#[doc(hidden)]
 pub fn exchange(path: &Path, lock: &WriterLock) -> Result<(), Error> {
     let (new, old) = (new_of(path), old_of(path));
     // A store with a live writer is not replaced. While this lock is held, no writer can start.
@@ -131,7 +126,6 @@ pub fn exchange(path: &Path, lock: &WriterLock) -> Result<(), Error> {
 /// Removes a store that this program created. It is renamed first, so that its name always belongs to a complete store or to nothing.
 ///
 /// Errors: the disk.
-#[doc(hidden)]
 pub fn remove(path: &Path) -> Result<(), Error> {
     let removed = beside(path, "being-removed");
     if removed.exists() {
