@@ -26,7 +26,7 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
         check_target(out, &inputs)?;
     }
     // A check writes no temporary files next to its input.
-    let settings = console.settings(memory::asked(args.memory.as_deref())?, None);
+    let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
     let sheets = (&args.sheets, false);
     let mut surface = input::load_with(&args.surfaces, sheets, &settings, console)?;
     let mut repair = None;

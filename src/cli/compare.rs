@@ -12,7 +12,7 @@ use tetdb_engine::api::{Comparison, Population, Qualities};
 const DIFFERENT: u8 = 7;
 
 pub fn run(args: &CompareArgs, console: &Console) -> Result<u8, Failure> {
-    let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
+    let settings = console.settings(memory::requested(args.read.memory.as_deref())?, None);
     let found = Comparison::of(&args.first, &args.second, &settings)?;
     if console.is_json() {
         let mut answer = json!(found);

@@ -13,16 +13,17 @@ use tetdb_engine::api::{Mesher, default_cap, short};
 
 pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let options = config::options(&args.shape)?;
-    let (cap, whence) = match memory::asked(args.memory.as_deref())? {
+    let (cap, whence) = match memory::requested(args.memory.as_deref())? {
         Some(cap) => (cap, "--memory".to_owned()),
         None => default_cap(),
     };
-    let settings = console.settings(Some(cap), threads::asked(args.threads)?);
+    let settings = console.settings(Some(cap), threads::requested(args.threads)?);
     let threads = settings.n_threads();
     let store = args.output.as_deref().unwrap_or(Path::new("."));
     // `cap` belongs to the planned run. The estimate itself needs the surface in memory, however large.
     let wide = console.settings(Some(cap.max(default_cap().0)), args.threads);
-    let (wide, sheets) = (input::beside(wide, store), (&args.sheets, options.refine_surface));
+    let (wide, sheets) =
+        (input::scratch_beside(wide, store), (&args.sheets, options.refine_surface));
     let surface = input::load_with(&args.surfaces, sheets, &wide, console)?;
     surface.validate_with(&wide)?;
     let found = Mesher::with_options(surface, options).settings(settings).predict_at(store)?;

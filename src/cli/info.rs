@@ -23,7 +23,7 @@ const SUBDOMAINS_LISTED: usize = 32;
 
 pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
     // The rows of a catalog take far less than the smallest cap.
-    let memory = memory::asked(args.of.memory.as_deref())?;
+    let memory = memory::requested(args.of.memory.as_deref())?;
     let path = &args.of.store;
     let excess = (args.excess)
         .then(|| Store::open_with(path, console.settings(memory, None))?.excess())

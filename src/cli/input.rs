@@ -9,7 +9,7 @@ use super::words::count;
 use tetdb_engine::api::{Code, EmbeddedKind, Settings, Surface};
 
 /// The same settings, with temporary files in the folder of `file` or its nearest existing parent.
-pub fn beside(settings: Settings, file: &Path) -> Settings {
+pub fn scratch_beside(settings: Settings, file: &Path) -> Settings {
     let absolute = std::path::absolute(file).unwrap_or_default();
     let above = absolute.ancestors().skip(usize::from(file != Path::new(".")));
     match above.into_iter().find(|folder| folder.is_dir()) {

@@ -8,11 +8,11 @@ use tetdb_engine::api::{MEMORY_LEAST, default_cap};
 
 /// The cap in bytes: the requested one, or a share of the free memory. Errors: as [`asked`].
 pub fn cap(option: Option<&str>) -> Result<u64, Failure> {
-    Ok(asked(option)?.unwrap_or_else(|| default_cap().0))
+    Ok(requested(option)?.unwrap_or_else(|| default_cap().0))
 }
 
 /// The requested cap. Errors: it is no size; it is below the minimum of any run.
-pub fn asked(option: Option<&str>) -> Result<Option<u64>, Failure> {
+pub fn requested(option: Option<&str>) -> Result<Option<u64>, Failure> {
     let Some(text) = option else { return Ok(None) };
     let bytes = parse(text)?;
     if bytes < MEMORY_LEAST.0 {

@@ -34,7 +34,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     let surface = input::load_with(
         &args.surfaces,
         (&args.sheets, options.refine_surface),
-        &input::beside(settings.clone(), &path),
+        &input::scratch_beside(settings.clone(), &path),
         console,
     )?;
     let created = Mesher::with_options(surface, options)
@@ -88,12 +88,12 @@ pub(super) fn begin(
     inputs: &[PathBuf],
     console: &Console,
 ) -> Result<Settings, Failure> {
-    let threads = threads::asked(args.threads)?;
+    let threads = threads::requested(args.threads)?;
     for out in &args.export {
         export::check_format(out)?;
         check_target(out, inputs)?;
     }
-    let cap = memory::asked(args.memory.as_deref())?;
+    let cap = memory::requested(args.memory.as_deref())?;
     #[cfg_attr(not(feature = "mpi"), allow(unused_mut))]
     let mut settings = console.settings(cap, threads);
     #[cfg(feature = "mpi")]

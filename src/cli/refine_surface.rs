@@ -24,8 +24,8 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     if !args.force {
         check_target(&args.output, &[PathBuf::from(&args.surface)])?;
     }
-    let settings = console.settings(memory::asked(args.memory.as_deref())?, None);
-    let settings = input::beside(settings, &args.output);
+    let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
+    let settings = input::scratch_beside(settings, &args.output);
     let surface = Surface::load(std::slice::from_ref(&args.surface), &settings)?;
     let (fine, report) = surface.refined_with(h, sizes.hgrad, &settings)?;
     fine.write(&args.output)?;

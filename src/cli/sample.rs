@@ -44,7 +44,7 @@ fn copy(file: &Path, console: &Console) -> std::io::Result<()> {
 }
 
 /// Path of the file for content inside a surface written to `file`.
-fn beside(file: &Path, what: &str, end: Option<&str>) -> PathBuf {
+fn sibling(file: &Path, what: &str, end: Option<&str>) -> PathBuf {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let own = file.extension().unwrap_or_default().to_string_lossy();
     file.with_file_name(format!("{stem}_{what}.{}", end.unwrap_or(&own)))
@@ -57,7 +57,7 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         format!("{PREFIX}{}", args.sample)
     };
     let format = args.format.as_deref().unwrap_or("stl");
-    let settings = console.settings(memory::asked(args.memory.as_deref())?, None);
+    let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
     if args.output == Path::new("-") {
         return to_stdout(&word, format, &settings, console);
     }
@@ -68,18 +68,18 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         );
     }
     check_target(&args.output, &[])?;
-    let surface = Surface::load(&[word], &input::beside(settings, &args.output))?;
+    let surface = Surface::load(&[word], &input::scratch_beside(settings, &args.output))?;
     let [shell, sheets] = surface.split_sheets();
     let mut embed = String::new();
     if surface.n_sheet_triangles() > 0 {
-        let file = beside(&args.output, "sheets", None);
+        let file = sibling(&args.output, "sheets", None);
         check_target(&file, &[])?;
         sheets.write(&file)?;
         embed += &format!(" --embed {}", file.display());
     }
     let [edges, points] = surface.n_embedded();
     if edges + points > 0 {
-        let file = beside(&args.output, "wires", Some("obj"));
+        let file = sibling(&args.output, "wires", Some("obj"));
         check_target(&file, &[])?;
         surface.write_embedded(&file)?;
         for (option, n) in [("edges", edges), ("points", points)] {

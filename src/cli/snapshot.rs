@@ -11,7 +11,7 @@ use tetdb_engine::api::{Code, ColorBy, Snapped, Snapshot, Store};
 const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;
 
 pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
-    let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
+    let settings = console.settings(memory::requested(args.read.memory.as_deref())?, None);
     let snapshot = snapshot(args).map_err(|error| match error.code {
         Code::BadQuery => error.help("`tetdb snapshot --help` has examples"),
         _ => error,

@@ -19,7 +19,8 @@ const SUBDOMAINS_PER_TASK: u32 = 4;
 const MEMORY_PER_TASK: u64 = 4 << 30;
 
 pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
-    let memory_bytes = memory::asked(args.memory_per_task.as_deref())?.unwrap_or(MEMORY_PER_TASK);
+    let memory_bytes =
+        memory::requested(args.memory_per_task.as_deref())?.unwrap_or(MEMORY_PER_TASK);
     if let Some(out) = &args.export {
         ExportOptions::new().pieces().check(out)?;
     }
@@ -66,8 +67,8 @@ pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
 }
 
 pub fn work(args: &WorkArgs, console: &Console) -> Result<u8, Failure> {
-    let cap = memory::asked(args.memory.as_deref())?;
-    let settings = console.settings(cap, threads::asked(args.threads)?);
+    let cap = memory::requested(args.memory.as_deref())?;
+    let settings = console.settings(cap, threads::requested(args.threads)?);
     let mut tasks = Tasks::of(&args.store).wait(Duration::from_secs(args.wait));
     if let Some(dir) = args.scratch.clone().or_else(scratch_of_machine) {
         tasks = tasks.scratch(dir);

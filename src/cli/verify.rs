@@ -43,7 +43,7 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
 pub(super) fn settings(args: &VerifyArgs, console: &Console) -> Result<Settings, Failure> {
     let cap = memory::cap(args.read.memory.as_deref())?;
     #[cfg_attr(not(feature = "mpi"), allow(unused_mut))]
-    let mut settings = console.settings(Some(cap), threads::asked(args.threads)?);
+    let mut settings = console.settings(Some(cap), threads::requested(args.threads)?);
     #[cfg(feature = "mpi")]
     {
         settings = super::ranks::share_work(settings);

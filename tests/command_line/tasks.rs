@@ -79,7 +79,7 @@ fn work(place: &Place, task: u32) {
 }
 
 /// Runs all remaining tasks, one after the other.
-fn work_off(place: &Place) {
+fn run_jobs(place: &Place) {
     loop {
         next(place).into_iter().for_each(|task| work(place, task));
         if gather(place).succeeds().json()["finished"] == true {
@@ -225,7 +225,24 @@ fn a_damaged_or_missing_receipt_is_a_task_to_do_again_and_is_named() {
     let refused = place.run_line(&format!("work a.tetdb --task {first} --wait 0 --json"));
     assert_eq!((refused.error()["code"].as_str(), refused.exit()), (Some("task-file"), Some(4)));
     assert_eq!(gather(&place).exit(), Some(8));
-    work_off(&place);
+    run_jobs(&place);
+    is_as_of_one_process(&place, &expected);
+}
+
+#[test]
+fn a_committed_task_is_neither_listed_nor_done_again() {
+    let place = Place::new();
+    let expected = planned(&place, 2);
+    work(&place, 1);
+    gather(&place).succeeds();
+    let tasks = next(&place);
+    let [first, second, ..] = tasks[..] else { panic!("two tasks in a stage: {tasks:?}") };
+    work(&place, first);
+    assert_eq!(gather(&place).error()["code"], "tasks-left");
+    assert!(!next(&place).contains(&first) && next(&place).contains(&second));
+    let again = place.run_line(&format!("work a.tetdb --task {first} --wait 0 --json"));
+    assert_eq!(again.succeeds().json()["done_before"], true);
+    run_jobs(&place);
     is_as_of_one_process(&place, &expected);
 }
 
@@ -247,7 +264,7 @@ fn files_that_are_seen_late_cost_time_only() {
     let receipt = late(place.path("a.tetdb/work/task-00001.receipts"));
     place.run_line("gather a.tetdb --wait 60").succeeds();
     receipt.join().expect("it was shown");
-    work_off(&place);
+    run_jobs(&place);
     is_as_of_one_process(&place, &expected);
 }
 

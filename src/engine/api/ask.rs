@@ -1,5 +1,7 @@
 //! Questions: selecting tetrahedra of a store.
 
+use std::path::Path;
+
 use super::guard::guarded_in;
 use super::{Condition, Error, Store, VARIABLES};
 use tetdb_base::geom::{Aabb, Point};
@@ -206,13 +208,14 @@ impl<'s> Query<'s> {
 
     /// Starts the search. Answers are found as they are taken. Errors: damage; too little memory.
     pub fn answers(self) -> Result<Answers<'s>, Error> {
-        let memory = self.store.settings().cap()? / SORTED_SHARE;
+        let settings = self.store.settings();
+        let (memory, dir) = (settings.cap()? / SORTED_SHARE, settings.scratch_dir());
         let Self { store, selection, order, limit } = self;
         let (context, session) = store.context_and_session()?;
         let context = context.clone();
         let found = guarded_in(&context, || match order {
             None => Ok(Box::new(session.select(selection)?) as Hits),
-            Some(order) => sorted(session, selection, order, (limit, memory)),
+            Some(order) => sorted(session, selection, order, (limit, memory, &dir)),
         })?;
         Ok(Answers { context, found: Some(found), left: limit.unwrap_or(usize::MAX) })
     }
@@ -228,7 +231,7 @@ fn sorted<'s>(
     session: &'s mut QuerySession,
     selection: Selection,
     (variable, order): (usize, Order),
-    (limit, memory): (Option<usize>, u64),
+    (limit, memory, dir): (Option<usize>, u64, &Path),
 ) -> Result<Hits<'s>, Error> {
     let falls = order == Order::Falling;
     let few = limit.filter(|n| n.saturating_mul(2 * size_of::<Hit>()) as u64 <= memory);
@@ -239,7 +242,7 @@ fn sorted<'s>(
         return Ok(Box::new(session.extreme(&selection, falls, n)?.into_iter().map(Ok)));
     }
     let selected = session.select(selection)?;
-    Ok(Box::new(Ordered::new(selected, variable, falls, &std::env::temp_dir(), memory)?))
+    Ok(Box::new(Ordered::new(selected, variable, falls, dir, memory)?))
 }
 
 impl Iterator for Answers<'_> {

@@ -233,7 +233,7 @@ fn subdomains(catalog: &mut Catalog, rows: &[SubdomainRow]) -> Result<Vec<Subdom
     let (topology, coarse) = (catalog.topology()?, catalog.coarse_snapshots()?);
     let mut subdomains = Vec::with_capacity(rows.len());
     for row in rows {
-        let sizes = pipeline::asked(catalog, row.rank)?;
+        let sizes = pipeline::recorded_request(catalog, row.rank)?;
         let neighbors = topology.iter().find(|t| t.subdomain == row.rank);
         subdomains.push(SubdomainInfo {
             id: row.rank,

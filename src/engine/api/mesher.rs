@@ -312,7 +312,7 @@ impl Mesher {
             let message = "a store is not replaced by one that stays unfinished";
             return Err(Error::new(Code::Usage, message).with_help("choose another path"));
         }
-        self.options.run.hands = settings.hands.clone();
+        self.options.run.remote = settings.remote.clone();
         let cap = settings.cap()?;
         replace::settle(path, settings)?;
         if self.options.mesh.refine_surface {
@@ -400,7 +400,7 @@ impl Mesher {
     ) -> Result<(Prepared, Option<pipeline::HeadStart>), Error> {
         let (clock, surface) = (Instant::now(), &self.surface.inner);
         let watch = settings.watcher();
-        pipeline::ahead(surface, &self.options, cap, &watch, |taken| {
+        pipeline::head_start(surface, &self.options, cap, &watch, |taken| {
             let left = cap - taken;
             let scratch = scratch_beside(surface, left, path)?;
             attempt(|| surface::validate_with(surface, &scratch))?.accept()?;
@@ -501,9 +501,9 @@ impl Mesher {
 
 /// Reports notes and size warnings of a run to the listener.
 pub(super) fn report(summary: &pipeline::Summary, settings: &Settings) {
-    if let Some(asked) = summary.subdomains_asked {
+    if let Some(requested) = summary.subdomains_requested {
         settings.note(format!(
-            "note: {asked} sub-domains were asked for, the mesh has {}: one of fewer than 25,000 tetrahedra would be all refined zone",
+            "note: {requested} sub-domains were asked for, the mesh has {}: one of fewer than 25,000 tetrahedra would be all refined zone",
             summary.subdomains
         ));
     }

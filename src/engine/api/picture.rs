@@ -231,12 +231,18 @@ fn take(
         Subject::Stage(cut, stage) => QuerySession::open_stage(store, cut, stage, &share)?,
         _ => QuerySession::open(store, &share)?,
     };
-    attempt(|| snapshot.draw(out, &mut session, budget.available() / 8))?
+    let scratch = (&*settings.scratch_dir(), budget.available() / 8);
+    attempt(|| snapshot.draw(out, &mut session, scratch))?
 }
 
 impl Snapshot {
-    fn draw(&self, out: &Path, session: &mut QuerySession, memory: u64) -> Result<Snapped, Error> {
-        let (section, view) = pieces(self, session, memory)?;
+    fn draw(
+        &self,
+        out: &Path,
+        session: &mut QuerySession,
+        scratch: (&Path, u64),
+    ) -> Result<Snapped, Error> {
+        let (section, view) = pieces(self, session, scratch)?;
         let extent = section.extent;
         if extent.n == 0 {
             let message = "the plane cuts no tetrahedron of the mesh";
@@ -270,14 +276,12 @@ impl Snapshot {
     }
 }
 
-/// The pieces to draw, and the view of them.
+/// The pieces to draw, and the view of them. `(dir, memory)`: folder and bytes for sorting.
 fn pieces(
     snapshot: &Snapshot,
     session: &mut QuerySession,
-    memory: u64,
+    (dir, memory): (&Path, u64),
 ) -> Result<(Section, View), Error> {
-    let dir = std::env::temp_dir();
-    let dir: &Path = &dir;
     let bounds = session.bounds();
     let plane = snapshot.plane;
     if let Subject::Surface(shell) = snapshot.subject {

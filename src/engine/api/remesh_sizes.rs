@@ -71,15 +71,16 @@ impl RemeshSizes {
                 (limits, Some(values(lengths, ranks, open, settings.cap()?)?))
             }
         };
-        let (field, asked) = field(given, values.is_some(), (open, options), settings)?;
-        let mut asked = OptionsText::from_sizes(&asked.sizes, asked.size_field.as_ref());
+        let (field, requested) = field(given, values.is_some(), (open, options), settings)?;
+        let mut requested =
+            OptionsText::from_sizes(&requested.sizes, requested.size_field.as_ref());
         if let Some(Lengths::File(file)) = lengths {
-            asked.size_field = Some(file.to_string_lossy().into_owned());
+            requested.size_field = Some(file.to_string_lossy().into_owned());
         }
-        let asked = serde_json::to_value(&asked).unwrap_or_default();
+        let requested = serde_json::to_value(&requested).unwrap_or_default();
         let refine_by = factor.map(|factor| factor.to_string());
-        let asked = json!({ "options": asked, "refine_by": refine_by }).to_string();
-        Ok(Some(NewSizes { field, values, factor: scale, limits, beta, asked }))
+        let requested = json!({ "options": requested, "refine_by": refine_by }).to_string();
+        Ok(Some(NewSizes { field, values, factor: scale, limits, beta, requested }))
     }
 }
 
@@ -93,17 +94,17 @@ fn field(
 ) -> Result<(Option<SizeField>, MeshOptions), Error> {
     let is_given = given.is_some();
     let (sizes, size_field) = given.unwrap_or_default();
-    let mut asked = MeshOptions { sizes, size_field, ..MeshOptions::default() };
+    let mut requested = MeshOptions { sizes, size_field, ..MeshOptions::default() };
     if !is_given || has_lengths {
-        return Ok((None, asked));
+        return Ok((None, requested));
     }
-    job::identify_sizes(&mut asked)?;
+    job::identify_sizes(&mut requested)?;
     let mut all = options.clone();
-    all.mesh.sizes.add(&asked.sizes);
-    if asked.size_field.is_some() {
-        all.mesh.size_field.clone_from(&asked.size_field);
+    all.mesh.sizes.add(&requested.sizes);
+    if requested.size_field.is_some() {
+        all.mesh.size_field.clone_from(&requested.size_field);
     }
-    Ok((Some(field_of_surface(open, &all, settings)?), asked))
+    Ok((Some(field_of_surface(open, &all, settings)?), requested))
 }
 
 /// The size field of the surface that a store was made from, with these options. Errors: a changed surface.

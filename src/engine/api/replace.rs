@@ -13,15 +13,15 @@ use tetdb_store::store::{Catalog, StoreError, WriterLock};
 
 /// Path where the new store is built.
 pub fn new_of(path: &Path) -> PathBuf {
-    beside(path, "being-made")
+    sibling(path, "being-made")
 }
 
 fn old_of(path: &Path) -> PathBuf {
-    beside(path, "being-replaced")
+    sibling(path, "being-replaced")
 }
 
 /// The path with one more extension, so that stores with the same stem never collide.
-fn beside(path: &Path, extension: &str) -> PathBuf {
+fn sibling(path: &Path, extension: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".");
     name.push(extension);
@@ -127,7 +127,7 @@ pub fn exchange(path: &Path, lock: &WriterLock) -> Result<(), Error> {
 ///
 /// Errors: the disk.
 pub fn remove(path: &Path) -> Result<(), Error> {
-    let removed = beside(path, "being-removed");
+    let removed = sibling(path, "being-removed");
     if removed.exists() {
         DiskPath::from(&removed).remove_dir_all()?;
     }

@@ -67,7 +67,7 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
         }
         false => {
             let mut options = pipeline::Options::from(job::options_of(&job, &place)?);
-            options.run.hands = settings.hands.clone();
+            options.run.remote = settings.remote.clone();
             let catalog = Catalog::open_locked(&place, lock.clone())?;
             Some(go_on(catalog, &options, &mut surface, cap, settings)?)
         }
@@ -94,7 +94,7 @@ fn go_on(
     let (watch, budget) = (settings.watcher(), Budget::new(cap));
     let made = if catalog.state()? < StoreState::Coarse {
         let inner = &surface.inner;
-        let prepared = pipeline::ahead(inner, options, cap, &watch, |taken| {
+        let prepared = pipeline::head_start(inner, options, cap, &watch, |taken| {
             predict(inner, options, cap - taken, place)
         })?;
         settings.say(&Event::StoreBegun(place.to_owned()));

@@ -7,7 +7,7 @@ use tetdb_schema::code::Code;
 
 use super::memory::{Bytes, default_cap};
 use super::{Error, error::Remedy};
-use crate::pipeline::{self, Hands, MEMORY_MIN, Watcher};
+use crate::pipeline::{self, MEMORY_MIN, RemoteWorkers, Watcher};
 use tetdb_base::storage::{Budget, CancelToken, ScratchSpace};
 use tetdb_kernel::sizing::SizeWarning;
 
@@ -51,7 +51,7 @@ pub struct Settings {
     progress: Option<Listener>,
     scratch: Option<PathBuf>,
     /// Other processes that do part of the work.
-    pub(super) hands: Hands,
+    pub(super) remote: RemoteWorkers,
 }
 
 impl fmt::Debug for Settings {

@@ -73,7 +73,7 @@ pub(super) fn check(
     cap: u64,
     level: Level,
 ) -> Result<Report, Error> {
-    let options = verify_shared::options(cap, surface, level);
+    let options = verify_shared::options((cap, settings.scratch_dir()), surface, level);
     let verified = attempt(|| verify_shared::verify(store, settings, surface, &options));
     let error = match verified.map_err(StoreError::from) {
         Ok(Ok(report)) => return Ok(report),

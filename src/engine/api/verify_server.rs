@@ -40,7 +40,7 @@ impl Server {
         let surface = match &job.surface {
             None => None,
             Some((sources, print)) => {
-                let scratch = std::env::temp_dir().join("verify");
+                let scratch = settings.scratch_dir().join("verify");
                 let space = scratch_beside(&Surface::default(), cap, &scratch)?;
                 let read = api::Surface::of_record(sources, Path::new(&job.store), &space)?.inner;
                 if fingerprint(&read) != *print {
@@ -50,7 +50,11 @@ impl Server {
                 Some(read)
             }
         };
-        Ok(Self { options: options(cap, surface.as_ref(), job.level), surface, job })
+        Ok(Self {
+            options: options((cap, settings.scratch_dir()), surface.as_ref(), job.level),
+            surface,
+            job,
+        })
     }
 
     /// Verifies one sub-domain. Errors: damage; the disk; an unreadable order.
@@ -75,7 +79,7 @@ mod tests {
 
     use super::*;
     use crate::api::{Bytes, Mesher, Subdomains, guarded};
-    use crate::pipeline::{Hands, Helpers};
+    use crate::pipeline::{RemoteWorkers, WorkerPool};
     use tetdb_base::storage::RemoteFailure;
     use tetdb_store::audit::{Level, Report};
 
@@ -93,7 +97,7 @@ mod tests {
         RemoteFailure { code: error.code().to_owned(), message: error.message().to_owned() }
     }
 
-    impl Helpers for Threads {
+    impl WorkerPool for Threads {
         fn begin(&self, job: &[u8]) -> Result<usize, RemoteFailure> {
             let server = Server::begin(job, &small()).expect("a verification");
             *self.server.lock().expect("no panics") = Some(Arc::new(server.map_err(failure)?));
@@ -130,7 +134,7 @@ mod tests {
     ) -> (Result<Report, String>, usize) {
         let threads = Arc::new(threads);
         let mut settings = small();
-        settings.hands = Hands(Some(threads.clone()));
+        settings.remote = RemoteWorkers(Some(threads.clone()));
         let report = guarded(&settings, || {
             let mut store = Catalog::open(path)?;
             crate::api::verify::check(&mut store, &settings, surface, 64 << 20, Level::Delaunay)
@@ -143,14 +147,15 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let (path, surface) = made(dir.path());
         let mut store = Catalog::open(&path).expect("a store");
-        let options = options(64 << 20, Some(&surface), Level::Delaunay);
+        let space = (64 << 20, std::env::temp_dir());
+        let options = options(space, Some(&surface), Level::Delaunay);
         let one = audit::verify(&mut store, Some(&surface), &options).expect("sound");
         assert!(one.valid && one.subdomains > 1, "{one:?}");
         assert!(one.edges_present > 0 && one.points_present > 0 && one.interface_faces > 0);
         for slots in [0, 1, 4] {
             let threads = Threads { slots, ..Threads::default() };
             let (report, n) = found(&path, Some(&surface), threads);
-            assert_eq!(report.as_ref(), Ok(&one), "{slots} helpers");
+            assert_eq!(report.as_ref(), Ok(&one), "{slots} workers");
             assert_eq!(n > 0, slots > 0);
         }
         let broken = Threads { slots: 2, broken: Some(1), ..Threads::default() };
@@ -192,7 +197,7 @@ mod tests {
         };
         let one = of(0).expect_err("damage");
         for slots in [1, 3] {
-            assert_eq!(of(slots).expect_err("damage"), one, "{slots} helpers");
+            assert_eq!(of(slots).expect_err("damage"), one, "{slots} workers");
         }
     }
 }

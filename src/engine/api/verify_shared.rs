@@ -4,6 +4,7 @@
 //! single process.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use rkyv::{Archive, Deserialize, Serialize};
@@ -12,7 +13,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::Settings;
 use crate::pipeline::{
-    Hand, Helpers, PipelineError, Watcher, WorkKind, from_bytes, to_bytes, work_off,
+    PipelineError, Watcher, WorkKind, WorkerFn, WorkerPool, from_bytes, run_jobs, to_bytes,
 };
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{attempt, n_threads};
@@ -31,10 +32,14 @@ pub(super) struct Job {
 }
 
 /// Options for verifying within `cap`, less the memory of the surface.
-pub(super) fn options(cap: u64, surface: Option<&Surface>, level: Level) -> VerifyOptions {
+pub(super) fn options(
+    (cap, temp_dir): (u64, PathBuf),
+    surface: Option<&Surface>,
+    level: Level,
+) -> VerifyOptions {
     let held = surface.map_or(0, |s| s.bytes() as u64 + audit::wire_bytes(s));
     let memory = cap.saturating_sub(held).min(1 << 30) / 2;
-    VerifyOptions { level, memory_bytes: memory as usize, temp_dir: std::env::temp_dir() }
+    VerifyOptions { level, memory_bytes: memory as usize, temp_dir }
 }
 
 /// Memory for each thread that verifies sub-domains. A second thread took 24 to 66 MiB when memory was not short.
@@ -56,8 +61,8 @@ pub(super) fn verify(
 ) -> Result<Report, StoreError> {
     let n_subdomains = store.subdomains()?.len();
     let n_threads = threads(n_subdomains, surface, options);
-    let helpers = settings.hands.0.clone();
-    if n_subdomains < 2 || helpers.is_none() && n_threads == 1 {
+    let pool = settings.remote.0.clone();
+    if n_subdomains < 2 || pool.is_none() && n_threads == 1 {
         return audit::verify(store, surface, options);
     }
     let dir = std::path::absolute(store.dir()).unwrap_or_else(|_| store.dir().to_owned());
@@ -72,8 +77,8 @@ pub(super) fn verify(
             apex: apex.map(|p| p.to_array()),
             surface: surface.map(|s| (sources.clone(), fingerprint(s))),
         };
-        let slots = helpers.as_ref().map_or(0, |helpers| {
-            let begun = helpers.begin(&to_bytes(WorkKind::Verification, &job()));
+        let slots = pool.as_ref().map_or(0, |pool| {
+            let begun = pool.begin(&to_bytes(WorkKind::Verification, &job()));
             begun.unwrap_or_else(|failure| {
                 settings.note(format!("note: verified by one process: {}", failure.message));
                 0
@@ -89,8 +94,8 @@ pub(super) fn verify(
             done.map_err(StoreError::from).flatten()
         };
         let each = |slot, row: &SubdomainRow| {
-            let asked = helpers.as_ref().and_then(|h| ask(&**h, slot, row).ok());
-            asked.map_or_else(|| here(slot % n_threads, row), Ok)
+            let answer = pool.as_ref().and_then(|pool| ask(&**pool, slot, row).ok());
+            answer.map_or_else(|| here(slot % n_threads, row), Ok)
         };
         share(rows, [n_threads, slots], &here, &each, add)
     })
@@ -113,8 +118,8 @@ fn share(
     let all = (0..n_here).map(|k| (here, k)).chain((0..n_elsewhere).map(|k| (elsewhere, k)));
     let all: Vec<_> =
         all.map(|(look, k)| move |at: usize, _: &Watcher| Ok((at, look(k, &rows[at])))).collect();
-    let hands: Vec<Hand<usize, (usize, PartResult)>> =
-        all.iter().map(|hand| hand as Hand<_, _>).collect();
+    let workers: Vec<WorkerFn<usize, (usize, PartResult)>> =
+        all.iter().map(|worker| worker as WorkerFn<_, _>).collect();
     let mut waiting = BTreeMap::new();
     let mut next = 0;
     let mut commit = |(at, found): (usize, PartResult)| {
@@ -127,7 +132,7 @@ fn share(
     };
     // Jobs are taken from the end of the list.
     let jobs = (0..rows.len()).rev().collect();
-    let done = work_off(jobs, &hands, &|_| (), &mut commit);
+    let done = run_jobs(jobs, &workers, &|_| (), &mut commit);
     done.map_err(|error| match error {
         PipelineError::Store(error) => error,
         other => unreachable!("{other}: only what is added fails"),
@@ -135,8 +140,8 @@ fn share(
 }
 
 /// Lets a remote worker verify a sub-domain. Errors: a message.
-fn ask(helpers: &dyn Helpers, slot: usize, row: &SubdomainRow) -> Result<PartReport, String> {
-    let answer = helpers.perform(slot, to_bytes(WorkKind::PartOrder, row));
+fn ask(pool: &dyn WorkerPool, slot: usize, row: &SubdomainRow) -> Result<PartReport, String> {
+    let answer = pool.perform(slot, to_bytes(WorkKind::PartOrder, row));
     from_bytes(WorkKind::PartReport, &answer.map_err(|e| e.message)?)
 }
 

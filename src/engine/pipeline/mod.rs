@@ -26,7 +26,7 @@ mod workers;
 
 pub use error::PipelineError;
 pub use mesh::coarse_mesh;
-pub use mesh::{CoarseReport, HeadStart, Summary, ahead, mesh, mesh_prepared};
+pub use mesh::{CoarseReport, HeadStart, Summary, head_start, mesh, mesh_prepared};
 pub use plan::{
     Estimate, MEMORY_MIN, MeshOptions, Options, OptionsText, Plan, Prepared, RECIPE, RunOptions,
     SizeFile, Subdomains, Trial, least_for, prepare, recipe_of, record_recipe,
@@ -34,8 +34,8 @@ pub use plan::{
 pub use progress::silent;
 pub use progress::{Event, Watcher};
 pub use remesh::{
-    Forecast, NewSizes, Remade, ResaturateSummary, Resaturation, Values, asked, changed, forecast,
-    forget, resaturate, undo,
+    Forecast, NewSizes, ResaturateSummary, Resaturated, Resaturation, Values, changed, forecast,
+    forget, recorded_request, resaturate, undo,
 };
 pub use tasks::serve;
 pub use tasks::{
@@ -43,5 +43,5 @@ pub use tasks::{
     gather, is_being_worked, perform, plan as plan_tasks, status,
 };
 pub use tetdb_schema::work::{WorkKind, from_bytes, to_bytes};
-pub use work::{FineReport, Hands, Helpers, stage_faces};
-pub use workers::{Hand, work_off};
+pub use work::{FineReport, RemoteWorkers, WorkerPool, stage_faces};
+pub use workers::{WorkerFn, run_jobs};

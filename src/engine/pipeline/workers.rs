@@ -13,23 +13,23 @@ use tetdb_base::storage::RunContext;
 const TELL_EVERY: u128 = 100;
 
 /// The function with which a worker runs a job.
-pub type Hand<'a, J, D> = &'a (dyn Fn(J, &Watcher) -> Result<D, PipelineError> + Sync);
+pub type WorkerFn<'a, J, D> = &'a (dyn Fn(J, &Watcher) -> Result<D, PipelineError> + Sync);
 
-/// Runs `jobs` with one thread per function in `hands`. `commit` receives the results in the order of completion and returns the
+/// Runs `jobs` with one thread per function in `workers`. `commit` receives the results in the order of completion and returns the
 /// jobs that each result makes possible.
 ///
 /// Workers are threads, not tasks of the pool. A task that waits for a sort would start another job meanwhile and need its memory
-/// too. Errors: the first of `hands` and `commit`; results that other workers finish later are not committed.
-pub fn work_off<J: Send, D: Send>(
+/// too. Errors: the first of `workers` and `commit`; results that other workers finish later are not committed.
+pub fn run_jobs<J: Send, D: Send>(
     jobs: Vec<J>,
-    hands: &[Hand<J, D>],
+    workers: &[WorkerFn<J, D>],
     watch: &Watcher,
     commit: &mut dyn FnMut(D) -> Result<Vec<J>, PipelineError>,
 ) -> Result<(), PipelineError> {
     let list = JobQueue::new(jobs);
     let (tell, hear) = channel();
     std::thread::scope(|scope| {
-        for &run in hands {
+        for &run in workers {
             let (list, tell) = (&list, tell.clone());
             let context = RunContext::current();
             scope.spawn(move || match context {
@@ -49,24 +49,24 @@ pub fn work_off<J: Send, D: Send>(
 /// Runs a job for each of `items`, in their order. `commit` receives the results in the order of completion.
 ///
 /// Only the next few of thousands of jobs are created in advance, because each holds the owners of all interface faces of its
-/// sub-domain. `draw` creates a job; `draw` and `commit` share `state`. Errors: the first of `draw`, `hands` and `commit`.
+/// sub-domain. `draw` creates a job; `draw` and `commit` share `state`. Errors: the first of `draw`, `workers` and `commit`.
 pub fn map_bounded<S, I, J: Send, D: Send>(
     state: &mut S,
     items: Vec<I>,
-    hands: &[Hand<J, D>],
+    workers: &[WorkerFn<J, D>],
     watch: &Watcher,
     draw: impl Fn(&mut S, I) -> Result<J, PipelineError>,
     commit: impl Fn(&mut S, D) -> Result<(), PipelineError>,
 ) -> Result<(), PipelineError> {
     let mut items = items.into_iter();
-    let at_hand = 2 * hands.len();
+    let at_hand = 2 * workers.len();
     let mut jobs = Vec::with_capacity(at_hand);
     for item in items.by_ref().take(at_hand) {
         jobs.push(draw(state, item)?);
     }
     // Workers take the last job of the queue first.
     jobs.reverse();
-    work_off(jobs, hands, watch, &mut |done| {
+    run_jobs(jobs, workers, watch, &mut |done| {
         commit(state, done)?;
         let next = items.next().map(|item| draw(state, item));
         Ok(next.transpose()?.into_iter().collect())
@@ -198,7 +198,7 @@ mod tests {
             n if n == fail_at => Err(PipelineError::NothingFilled { policy: String::new() }),
             n => Ok(n),
         };
-        work_off(vec![n], &vec![run as Hand<u32, u32>; workers], &silent, &mut |n| {
+        run_jobs(vec![n], &vec![run as WorkerFn<u32, u32>; workers], &silent, &mut |n| {
             if n == 1 {
                 leaves += 1;
                 return Ok(Vec::new());
@@ -217,7 +217,7 @@ mod tests {
         }
         let nothing: Vec<u32> = Vec::new();
         assert!(
-            work_off(
+            run_jobs(
                 nothing,
                 &[&|n, _: &Watcher| Ok(n), &|n, _: &Watcher| Ok(n)],
                 &silent,
@@ -236,7 +236,7 @@ mod tests {
         for (in_watch, in_commit) in [(true, false), (false, true)] {
             let watch = |_: Event| assert!(!in_watch, "the caller's own trouble");
             let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                work_off(vec![1, 2], &[run as Hand<u32, u32>; 2], &watch, &mut |n| {
+                run_jobs(vec![1, 2], &[run as WorkerFn<u32, u32>; 2], &watch, &mut |n| {
                     assert!(!in_commit, "the same here");
                     // Adds one more job each time, without end.
                     Ok(vec![n])

@@ -98,7 +98,7 @@ impl Case {
             factor: 0.8,
             limits: [0.0, f64::INFINITY],
             beta: self.options.mesh.sizes.beta(),
-            asked: "{}".to_owned(),
+            requested: "{}".to_owned(),
         };
         let what = Resaturation { ranks: [2, 5].into(), sizes: Some(sizes), repair: false };
         let mut catalog = Catalog::open_writable(self.store(disk))?;

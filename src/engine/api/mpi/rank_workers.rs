@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::mailbox::{CONTROL, DONE, Mailbox};
 use crate::api::Code;
-use crate::pipeline::Helpers;
+use crate::pipeline::WorkerPool;
 use tetdb_base::storage::RemoteFailure;
 
 /// All ranks other than 0, as workers.
@@ -58,7 +58,7 @@ impl RankWorkers {
     }
 }
 
-impl Helpers for RankWorkers {
+impl WorkerPool for RankWorkers {
     fn begin(&self, job: &[u8]) -> Result<usize, RemoteFailure> {
         for rank in self.mailbox.others() {
             self.order(rank, CONTROL, [&[DONE], job].concat())?;

@@ -12,7 +12,7 @@ use super::rank_workers::RankWorkers;
 use super::shared_file::{SharedFile, WAIT};
 use crate::api::verify_server::Server;
 use crate::api::{Code, Error, Settings, guarded};
-use crate::pipeline::{self, Hands, PipelineError, TaskSettings};
+use crate::pipeline::{self, PipelineError, RemoteWorkers, TaskSettings};
 use tetdb_io::write::{Share, Writers};
 
 /// The rank of this process in an MPI program. Clones stand for the same process.
@@ -65,7 +65,7 @@ impl Ranks {
     /// Lets a run of rank 0 with these settings use the other ranks, which must call [`serve`](Self::serve).
     pub fn share_work(&self, mut settings: Settings) -> Settings {
         if self.is_first() && !self.is_alone() {
-            settings.hands = Hands(Some(self.workers.clone()));
+            settings.remote = RemoteWorkers(Some(self.workers.clone()));
         }
         settings
     }

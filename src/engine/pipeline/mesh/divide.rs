@@ -8,7 +8,7 @@ use crate::pipeline::progress::Watcher;
 use crate::pipeline::tasks::{ask, wrong_receipt};
 use crate::pipeline::tree;
 use crate::pipeline::work::{Worker, Workplace};
-use crate::pipeline::workers::{Hand, work_off};
+use crate::pipeline::workers::{WorkerFn, run_jobs};
 use tetdb_kernel::bisect::CutReport;
 use tetdb_schema::work::{CutOrder, CutReceipt, Receipt, WorkOrder};
 
@@ -38,12 +38,12 @@ impl Run<'_> {
             let (receipt, report) = worker.cut(&order, share, watch)?;
             Ok((order, receipt, Some(report)))
         };
-        let there = self.helpers()?;
+        let there = self.pool()?;
         let store = &worker.place.store;
         let elsewhere: Vec<_> = (there.iter())
-            .map(|(helpers, slot)| {
+            .map(|(pool, slot)| {
                 move |(order, _): (CutOrder, Plan), _: &Watcher| match ask(
-                    &**helpers,
+                    &**pool,
                     *slot,
                     &WorkOrder::Cut(order.clone()),
                     store,
@@ -53,9 +53,9 @@ impl Run<'_> {
                 }
             })
             .collect();
-        let mut hands: Vec<Hand<(CutOrder, Plan), CutDone>> = vec![&here; workers];
-        hands.extend(elsewhere.iter().map(|hand| hand as Hand<_, _>));
-        work_off(orders, &hands, watch, &mut |(order, receipt, report)| {
+        let mut workers: Vec<WorkerFn<(CutOrder, Plan), CutDone>> = vec![&here; workers];
+        workers.extend(elsewhere.iter().map(|worker| worker as WorkerFn<_, _>));
+        run_jobs(orders, &workers, watch, &mut |(order, receipt, report)| {
             reports.extend(report);
             commit_cuts(self.catalog, std::slice::from_ref(&receipt))?;
             self.count(receipt.traffic);

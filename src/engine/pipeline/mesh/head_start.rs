@@ -101,7 +101,7 @@ impl HeadStartShare {
 ///
 /// `look` receives the number of bytes of the cap that it must leave free; its result must not depend on this number. Effects:
 /// none on disk. Errors: those of `look`; the inserted vertices are then dropped.
-pub fn ahead<T, E>(
+pub fn head_start<T, E>(
     surface: &Surface,
     options: &Options,
     cap: u64,
@@ -222,7 +222,7 @@ mod tests {
         let kernel = inserted(&mut flat, &surface, &ScratchSpace::boundless(), &silent);
         let expected = records(&mut flat);
         let begun =
-            with_threads(2, || ahead(&surface, &options, CAP, &silent, Ok::<_, StorageError>));
+            with_threads(2, || head_start(&surface, &options, CAP, &silent, Ok::<_, StorageError>));
         let (taken, begun) = begun.expect("nothing to object to");
         let begun = begun.expect("two threads and room for all");
         assert!(taken > begun.bytes());
@@ -251,12 +251,13 @@ mod tests {
     #[test]
     fn a_refused_surface_and_too_little_room_leave_nothing() {
         let (surface, options) = (surface(), Options::default());
-        let refused =
-            with_threads(2, || ahead(&surface, &options, CAP, &silent, |_| Err::<(), _>("bad")));
+        let refused = with_threads(2, || {
+            head_start(&surface, &options, CAP, &silent, |_| Err::<(), _>("bad"))
+        });
         assert_eq!(refused.err(), Some("bad"));
         for (threads, cap) in [(1, CAP), (2, 16 << 20)] {
             let looked = with_threads(threads, || {
-                ahead(&surface, &options, cap, &silent, Ok::<_, StorageError>)
+                head_start(&surface, &options, cap, &silent, Ok::<_, StorageError>)
             });
             assert!(matches!(looked, Ok((0, None))));
         }

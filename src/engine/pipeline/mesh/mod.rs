@@ -9,5 +9,5 @@ mod run;
 
 pub use coarse::CoarseReport;
 pub use coarse::coarse as coarse_mesh;
-pub use head_start::{HeadStart, ahead};
+pub use head_start::{HeadStart, head_start};
 pub use run::{Summary, mesh, mesh_prepared};

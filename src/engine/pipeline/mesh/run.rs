@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use super::coarse::{CoarseReport, inserted, recovered};
 use super::commit::{close, commit_subdomain, subdomain_order};
-use super::head_start::{HeadStart, ahead};
+use super::head_start::{HeadStart, head_start};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::estimate::n_subdomains;
 use crate::pipeline::plan::leases::Leases;
@@ -18,8 +18,8 @@ use crate::pipeline::tasks::{ask, begin, wrong_receipt};
 use crate::pipeline::tree::{self, DONE};
 use crate::pipeline::work::common::Common;
 use crate::pipeline::work::traffic::pages_of;
-use crate::pipeline::work::{FineReport, Helpers, Worker, Workplace};
-use crate::pipeline::workers::{Hand, map_bounded};
+use crate::pipeline::work::{FineReport, Worker, WorkerPool, Workplace};
+use crate::pipeline::workers::{WorkerFn, map_bounded};
 use tetdb_base::geom::{Aabb, HilbertFrame};
 use tetdb_base::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
 use tetdb_base::surface::Surface;
@@ -50,7 +50,7 @@ pub struct Summary {
     /// Number of sub-domains of the mesh.
     pub subdomains: u32,
     /// Requested number of sub-domains, if it was larger than the mesh allows.
-    pub subdomains_asked: Option<u32>,
+    pub subdomains_requested: Option<u32>,
     /// Pages read and written.
     pub pages: PagerStats,
     /// Largest number of pages held in memory at once.
@@ -72,7 +72,7 @@ pub fn mesh(
     let left = budget.cap().saturating_sub(surface.bytes() as u64);
     match catalog.blob(Blob::SizeField)? {
         None => {
-            let (prepared, begun) = ahead(surface, options, budget.cap(), watch, |taken| {
+            let (prepared, begun) = head_start(surface, options, budget.cap(), watch, |taken| {
                 let room = ScratchSpace::new(left.saturating_sub(taken), scratch);
                 prepare(surface, options, None, &room)
             })?;
@@ -155,7 +155,7 @@ pub struct Run<'a> {
 }
 
 /// The remote workers, and the number of one of their slots; each slot performs one order at a time.
-type Slot = (Arc<dyn Helpers>, usize);
+type Slot = (Arc<dyn WorkerPool>, usize);
 
 /// The receipt of a finished sub-domain, and the report if this process meshed it.
 type SubdomainDone = (Box<SubdomainReceipt>, Option<FineReport>);
@@ -193,7 +193,7 @@ impl<'a> Run<'a> {
         let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
         let mut left = tree::subtrees(self.catalog, self.n)?;
         left.retain(|p| !sealed.contains(&p.ranks.first));
-        self.leaves(left, open, &mut summary)?;
+        self.saturate_all(left, open, &mut summary)?;
         close(self.catalog, self.n)?;
         (summary.pages, summary.frames_used) = (self.pages, self.frames_used);
         Ok(summary)
@@ -205,14 +205,14 @@ impl<'a> Run<'a> {
         sizes: Option<SizeSummary>,
         cuts: Vec<CutReport>,
     ) -> Result<Summary, PipelineError> {
-        let asked = self.options.mesh.subdomains.count();
+        let requested = self.options.mesh.subdomains.count();
         Ok(Summary {
             coarse,
             sizes,
             cuts,
             fine: BTreeMap::new(),
             subdomains: self.n,
-            subdomains_asked: asked.filter(|&asked| asked > self.n),
+            subdomains_requested: requested.filter(|&requested| requested > self.n),
             pages: self.pages,
             frames_used: self.frames_used,
         })
@@ -319,7 +319,7 @@ impl<'a> Run<'a> {
     }
 
     /// Meshes the remaining sub-domains, as many at once as threads and memory allow.
-    fn leaves(
+    fn saturate_all(
         &mut self,
         left: Vec<SubtreeMesh>,
         open: Option<Mesh>,
@@ -341,13 +341,13 @@ impl<'a> Run<'a> {
         };
         let there = match left.is_empty() {
             true => Vec::new(),
-            false => self.helpers()?,
+            false => self.pool()?,
         };
         let store = &worker.place.store;
         let elsewhere: Vec<_> = (there.iter())
-            .map(|(helpers, slot)| {
+            .map(|(pool, slot)| {
                 move |order: SubdomainOrder, _: &Watcher| match ask(
-                    &**helpers,
+                    &**pool,
                     *slot,
                     &WorkOrder::Subdomain(order),
                     store,
@@ -357,12 +357,12 @@ impl<'a> Run<'a> {
                 }
             })
             .collect();
-        let mut hands: Vec<Hand<SubdomainOrder, SubdomainDone>> = vec![&here; workers];
-        hands.extend(elsewhere.iter().map(|hand| hand as Hand<_, _>));
+        let mut workers: Vec<WorkerFn<SubdomainOrder, SubdomainDone>> = vec![&here; workers];
+        workers.extend(elsewhere.iter().map(|worker| worker as WorkerFn<_, _>));
         map_bounded(
             &mut (self, summary),
             left,
-            &hands,
+            &workers,
             watch,
             |(run, _), part| Ok(subdomain_order(run.catalog, run.n, part)?),
             |(run, summary), (leaf, fine)| run.seal_step(&leaf, fine, summary),
@@ -384,16 +384,16 @@ impl<'a> Run<'a> {
 
     /// Returns one entry for each order that remote workers perform at once; empty without remote workers. Effects: the workers
     /// begin.
-    pub fn helpers(&mut self) -> Result<Vec<Slot>, PipelineError> {
-        let Some(helpers) = self.options.run.hands.0.clone() else {
+    pub fn pool(&mut self) -> Result<Vec<Slot>, PipelineError> {
+        let Some(pool) = self.options.run.remote.0.clone() else {
             return Ok(Vec::new());
         };
         let slots = match self.slots {
             Some(slots) => slots,
-            None => begin(&*helpers, self.catalog, self.options, &self.bounds)?,
+            None => begin(&*pool, self.catalog, self.options, &self.bounds)?,
         };
         self.slots = Some(slots);
-        Ok((0..slots).map(|slot| (helpers.clone(), slot)).collect())
+        Ok((0..slots).map(|slot| (pool.clone(), slot)).collect())
     }
 
     /// Adds the traffic of an order to the totals of the run.

@@ -114,7 +114,7 @@ pub struct Estimate {
     /// Number of sub-domains of the mesh.
     pub subdomains: u32,
     /// Requested number of sub-domains, if it was larger than the mesh allows.
-    pub subdomains_asked: Option<u32>,
+    pub subdomains_requested: Option<u32>,
     surface_bytes: u64,
     least_to_prepare: u64,
     /// Bytes of the size field: its octree, and the sizes at cell corners. The sizes go to a scratch file if their share of the
@@ -163,7 +163,7 @@ fn prepare_in(
     if let (Some(file), None) = (&options.mesh.size_field, background) {
         return Err(PipelineError::SizeField { file: file.path.clone() });
     }
-    let asked = &options.mesh.sizes;
+    let requested = &options.mesh.sizes;
     let isolated_points = surface.isolated_points();
     let built = |regions: &[Region]| {
         let mut constraints: Vec<&dyn SizeConstraint> =
@@ -176,7 +176,7 @@ fn prepare_in(
         }
         let further =
             ExtraSizes { constraints: &constraints, at_vertices, at_points: &isolated_points };
-        SizeField::build_with(&surface.points, &surface.triangles, asked, &further, scratch)
+        SizeField::build_with(&surface.points, &surface.triangles, requested, &further, scratch)
     };
     let enclosed = || {
         // Leased before the tree takes its share of the free bytes.
@@ -186,7 +186,7 @@ fn prepare_in(
         (seeker, volumes)
     };
     let has_room = scratch.available() >= (ROOM_FOR_BOTH * surface.n_triangles()) as u64;
-    let (early, (seeker, volumes)) = if !asked.regions.is_empty() {
+    let (early, (seeker, volumes)) = if !requested.regions.is_empty() {
         (None, enclosed())
     } else if has_room {
         let (early, enclosed) = join(|| built(&[]), enclosed);
@@ -206,7 +206,7 @@ fn prepare_in(
     let domain = Domain { seeker: &seeker, volumes: &volumes, filled: &filled };
     let (field, mut sizes) = match early {
         Some(built) => built,
-        None => built(&region_sizes(&domain, &chosen.names, asked, scratch)?)?,
+        None => built(&region_sizes(&domain, &chosen.names, requested, scratch)?)?,
     };
     if background.is_some() {
         sizes.source = format!("a size field, {}", sizes.source);
@@ -262,7 +262,7 @@ impl Estimate {
             Mode::Delaunay => DELAUNAY,
             Mode::Full => 1.0,
         };
-        let (subdomains, subdomains_asked) = n_subdomains(counts.tets(), options);
+        let (subdomains, subdomains_requested) = n_subdomains(counts.tets(), options);
         let sides = (0..surface.n_triangles())
             .flat_map(|t| domain.volumes.of_side[t])
             .filter(|&v| domain.filled[v as usize]);
@@ -273,7 +273,7 @@ impl Estimate {
             sides: sides.count() as u64,
             vertices: surface.n_vertices() as f64 + counts.inner_vertices,
             subdomains,
-            subdomains_asked,
+            subdomains_requested,
             surface_bytes: surface.bytes() as u64,
             least_to_prepare: least_to_prepare(surface, !options.mesh.sizes.regions.is_empty()),
             octree_bytes: field.bytes_in(0) - SizeField::share_of(0).min(sizes_bytes),
@@ -438,7 +438,7 @@ fn least_to_prepare(surface: &Surface, regions_have_sizes: bool) -> u64 {
 
 /// Number of sub-domains for a mesh of `tets` tetrahedra, and the requested number if that is larger.
 pub fn n_subdomains(tets: f64, options: &Options) -> (u32, Option<u32>) {
-    let asked = options.mesh.subdomains.count();
+    let requested = options.mesh.subdomains.count();
     let each = (tets / MANY).clamp(TETS_PER_SUBDOMAIN, TETS_PER_SUBDOMAIN_MAX);
     // The number is even: three sub-domains take longer on two threads than two or four.
     let auto = match tets > TETS_ALONE {
@@ -446,9 +446,9 @@ pub fn n_subdomains(tets: f64, options: &Options) -> (u32, Option<u32>) {
         false => 1.0,
     };
     let most = (tets / options.run.subdomain_tets_min()).floor().max(1.0);
-    let wanted = asked.map_or(auto, f64::from);
+    let wanted = requested.map_or(auto, f64::from);
     let n = wanted.min(most).min(f64::from(1u32 << 20)) as u32;
-    (n, asked.filter(|_| wanted > most && wanted > 1.0))
+    (n, requested.filter(|_| wanted > most && wanted > 1.0))
 }
 
 #[cfg(test)]

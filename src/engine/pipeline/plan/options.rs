@@ -1,7 +1,7 @@
 //! Options: those that determine the mesh, and those of one run.
 
 use super::Plan;
-use crate::pipeline::work::Hands;
+use crate::pipeline::work::RemoteWorkers;
 use tetdb_kernel::bisect::Method;
 use tetdb_kernel::boundary::RegionRule;
 use tetdb_kernel::optimize::Mode;
@@ -79,7 +79,7 @@ pub struct RunOptions {
     /// True if the run ends with the coarse mesh, for tasks to do the rest.
     pub coarse_only: bool,
     /// Remote workers that share the work.
-    pub hands: Hands,
+    pub remote: RemoteWorkers,
     /// Method of choosing cuts, for comparisons. A resumed run uses the default method.
     pub method: Method,
     /// Settings for tests.

@@ -9,6 +9,6 @@ mod summary;
 
 pub use previous::{forget, undo};
 pub use request::Resaturation;
-pub use resaturate::{Forecast, asked, changed, forecast, resaturate};
+pub use resaturate::{Forecast, changed, forecast, recorded_request, resaturate};
 pub use sizes::{NewSizes, Values};
-pub use summary::{Remade, ResaturateSummary};
+pub use summary::{ResaturateSummary, Resaturated};

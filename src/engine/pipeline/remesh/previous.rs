@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use super::summary::{Remade, ResaturateSummary};
+use super::summary::{ResaturateSummary, Resaturated};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::seal::totals::{journal, sum_totals};
 use crate::pipeline::tree::{self, read_blob};
@@ -29,7 +29,7 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
         for [now, previous] in Blob::versioned(rank) {
             blobs.push(([now, previous], catalog.blob(previous)?, catalog.blob(now)?));
         }
-        parts.push(Remade { before: catalog.subdomain(rank)?, after: row, fine: None });
+        parts.push(Resaturated { before: catalog.subdomain(rank)?, after: row, fine: None });
     }
     let regions = sum_totals(catalog, n, &totals)?.regions;
     catalog.commit(|step| {

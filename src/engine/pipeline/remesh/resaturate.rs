@@ -96,7 +96,7 @@ pub fn changed(
 /// the whole.
 ///
 /// Errors: a damaged catalog.
-pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreError> {
+pub fn recorded_request(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreError> {
     let bytes = catalog.blob(Blob::Request(rank))?;
     Ok(bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
 }

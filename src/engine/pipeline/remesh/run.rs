@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::previous::Previous;
 use super::request::Resaturation;
 use super::sizes::{Recorded, Values};
-use super::summary::{Remade, ResaturateSummary};
+use super::summary::{ResaturateSummary, Resaturated};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::Watcher;
@@ -17,7 +17,7 @@ use crate::pipeline::work::coarse_snapshot::reopen;
 use crate::pipeline::work::common::Common;
 use crate::pipeline::work::soundness::{check_owners, panic_is_damage_of};
 use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
-use crate::pipeline::workers::{Hand, map_bounded};
+use crate::pipeline::workers::{WorkerFn, map_bounded};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Backing, Budget, DiskPath, PagerStats, ScratchSpace, attempt};
 use tetdb_kernel::mesh::Workspace;
@@ -197,14 +197,14 @@ impl<'a> RemeshRun<'a> {
     ) -> Result<ResaturateSummary, PipelineError> {
         let of = |field: &SizeField| field.bytes() as u64;
         let own: u64 = fields.values().flatten().map(of).sum();
-        let asked = self.what.sizes.as_ref().and_then(|s| s.field.as_ref());
+        let requested = self.what.sizes.as_ref().and_then(|s| s.field.as_ref());
         // The fields of the sub-domains are also held as bytes until they are committed.
         let made: BTreeMap<u32, Vec<u8>> = (fields.iter())
             .filter_map(|(&rank, field)| Some((rank, field.as_ref()?.to_bytes())))
             .filter(|_| self.what.sizes.is_some())
             .collect();
         let encoded: u64 = made.values().map(|bytes| bytes.len() as u64).sum();
-        let held = own + encoded + of(&self.field) + asked.map_or(0, of);
+        let held = own + encoded + of(&self.field) + requested.map_or(0, of);
         let _fields = budget.lease(held, "the size fields")?;
         let plan = Plan::new(budget.cap(), held)?;
         let leased = plan.frames + plan.redb + plan.redb / 2 + plan.buffers;
@@ -220,7 +220,7 @@ impl<'a> RemeshRun<'a> {
         map_bounded(
             &mut state,
             fields.into_iter().collect(),
-            &vec![run as Hand<RemeshJob, Box<FinishedSubdomain>>; workers],
+            &vec![run as WorkerFn<RemeshJob, Box<FinishedSubdomain>>; workers],
             watch,
             |(again, _), (rank, field)| again.job(meshes[rank as usize], field, share),
             |(_, finished), subdomain| {
@@ -249,8 +249,8 @@ impl<'a> RemeshRun<'a> {
             Some(_) => Vec::new(),
             None => tree::zones_above(self.catalog, mesh.ranks, self.n)?,
         };
-        let asked = self.rows.iter().find(|(row, _)| row.rank == rank);
-        let (row, kept) = asked.expect("asked for");
+        let found = self.rows.iter().find(|(row, _)| row.rank == rank);
+        let (row, kept) = found.expect("requested");
         let (row, kept) = (row.clone(), *kept);
         let last = self.last.get(&rank).copied().unwrap_or(0);
         let generation = last + 2 + 2 * self.steps;
@@ -308,7 +308,7 @@ impl<'a> RemeshRun<'a> {
         let regions = sum_totals(self.catalog, self.n, &totals)?.regions;
         let dropped = Previous::of(self.catalog)?;
         let (what, rows, clock) = (self.what, &self.rows, self.clock);
-        let asked = what.sizes.as_ref().map(|sizes| sizes.asked.as_bytes());
+        let requested = what.sizes.as_ref().map(|sizes| sizes.requested.as_bytes());
         let step_name = match what.repair {
             true => "repair",
             false => "resaturate",
@@ -331,9 +331,9 @@ impl<'a> RemeshRun<'a> {
                     true => step.unlist_file(rank, row.generation),
                     false => step.set_previous(row),
                 }
-                if let (Some(field), Some(asked)) = (made.get(&rank), asked) {
+                if let (Some(field), Some(requested)) = (made.get(&rank), requested) {
                     step.set_blob(Blob::SubdomainField(rank), field);
-                    step.set_blob(Blob::Request(rank), asked);
+                    step.set_blob(Blob::Request(rank), requested);
                 }
                 let refine = &subdomain.fine.refine;
                 let measures = [
@@ -381,7 +381,7 @@ impl<'a> RemeshRun<'a> {
         for ((before, _), subdomain) in self.rows.iter().zip(finished.into_values()) {
             summary.pages.add(subdomain.pages);
             summary.frames_used = summary.frames_used.max(subdomain.frames_used);
-            summary.parts.push(Remade {
+            summary.parts.push(Resaturated {
                 before: before.clone(),
                 after: subdomain.sealed.row,
                 fine: Some(subdomain.fine),

@@ -49,7 +49,7 @@ pub struct NewSizes {
     /// Slope with which lengths grow from the fixed faces.
     pub beta: f64,
     /// Text of the request, to be recorded.
-    pub asked: String,
+    pub requested: String,
 }
 
 /// Wanted lengths of a sub-domain.
@@ -155,8 +155,8 @@ impl Recorded<'_> {
         memory: u64,
     ) -> Result<bool, PipelineError> {
         // A repeated request changes nothing, whatever mesh it gave the first time.
-        let asked = catalog.blob(Blob::Request(rank))?;
-        if sizes.factor == 1.0 && asked.as_deref() == Some(sizes.asked.as_bytes()) {
+        let requested = catalog.blob(Blob::Request(rank))?;
+        if sizes.factor == 1.0 && requested.as_deref() == Some(sizes.requested.as_bytes()) {
             return Ok(false);
         }
         let own = self.own(catalog, rank)?;

@@ -6,7 +6,7 @@ use tetdb_schema::catalog::SubdomainRow;
 
 /// Rows of a sub-domain before and after remeshing.
 #[derive(Clone, Debug)]
-pub struct Remade {
+pub struct Resaturated {
     /// Its row in the catalog before the run.
     pub before: SubdomainRow,
     /// Its row in the catalog after the run.
@@ -19,7 +19,7 @@ pub struct Remade {
 #[derive(Clone, Debug, Default)]
 pub struct ResaturateSummary {
     /// The changed sub-domains, by rank.
-    pub parts: Vec<Remade>,
+    pub parts: Vec<Resaturated>,
     /// Pages read and written.
     pub pages: PagerStats,
     /// Largest number of pages held in memory at once.

@@ -1,5 +1,6 @@
 //! The folder of tasks: its names, and file writes that complete or leave no file.
 
+use std::collections::BTreeSet;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -76,6 +77,10 @@ impl TaskFolder {
         self.dir.join("stage")
     }
 
+    pub fn committed_path(&self) -> DiskPath {
+        self.dir.join("committed")
+    }
+
     pub fn field_path(&self) -> DiskPath {
         self.dir.join("size-field")
     }
@@ -122,6 +127,21 @@ impl TaskFolder {
         let bytes = read(&self.stage_path())?.unwrap_or_default();
         let text = String::from_utf8_lossy(&bytes);
         Ok(text.trim().parse().unwrap_or(0))
+    }
+
+    /// Numbers of the committed tasks of the current stage, as of the last gathering.
+    pub fn committed(&self) -> Result<BTreeSet<u32>, StorageError> {
+        let bytes = read(&self.committed_path())?.unwrap_or_default();
+        let text = String::from_utf8_lossy(&bytes);
+        Ok(text.split_whitespace().filter_map(|word| word.parse().ok()).collect())
+    }
+
+    /// Records the current stage and its committed tasks.
+    pub fn set_stage(&self, stage: usize, committed: &[u32]) -> Result<(), StorageError> {
+        let words: Vec<String> = committed.iter().map(u32::to_string).collect();
+        // Numbers of tasks are unique over all stages, so the order of these two writes does not matter.
+        write(&self.committed_path(), &[words.join(" ").as_bytes()])?;
+        write(&self.stage_path(), &[stage.to_string().as_bytes()])
     }
 
     pub fn mark(&self, task: u32) -> Option<TaskMark> {

@@ -5,7 +5,7 @@ use std::hash::{BuildHasher, RandomState};
 use std::ops::Range;
 use std::time::Duration;
 
-use super::folder::{Patience, TaskFolder, copy, damaged, read_record, write, write_record};
+use super::folder::{Patience, TaskFolder, copy, damaged, read_record, write_record};
 use super::schedule::{Stage, StageKind, stages};
 use super::status::is_being_worked;
 use crate::pipeline::error::PipelineError;
@@ -147,7 +147,9 @@ impl GatherRun<'_> {
                 for (task, _) in &gathered.left {
                     self.give_orders(stage, *task)?;
                 }
-                write(&self.folder.stage_path(), &[number.to_string().as_bytes()])?;
+                let is_left = |task| gathered.left.iter().any(|(left, _)| *left == task);
+                let committed: Vec<u32> = stage.tasks().filter(|&task| !is_left(task)).collect();
+                self.folder.set_stage(number, &committed)?;
                 return Ok(gathered);
             }
         }

@@ -7,6 +7,7 @@
 //! | `plan` | [`plan`] | number of tasks, and parameters common to all |
 //! | `size-field` | [`plan`] | the size field |
 //! | `stage` | [`gather`] | the number of the first stage that is not committed, in digits |
+//! | `committed` | [`gather`] | numbers of the committed tasks of that stage, in digits |
 //! | `task-00017.orders` | [`gather`] | orders of task 17 |
 //! | `task-00017.mark` | the task | host and process of the task, renewed while it lives; its error |
 //! | `files-ATTEMPT/` | the task | the files it wrote, under their final names |

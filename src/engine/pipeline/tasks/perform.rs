@@ -15,7 +15,7 @@ use crate::pipeline::plan::{MeshOptions, Options, Plan};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::work::common::Common;
 use crate::pipeline::work::{Worker, Workplace};
-use crate::pipeline::workers::{Hand, work_off};
+use crate::pipeline::workers::{WorkerFn, run_jobs};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Budget, DiskPath, ScratchSpace, StorageError, attempt, host_name};
 use tetdb_kernel::sizing::SizeField;
@@ -65,7 +65,8 @@ pub fn perform(
         let Some(stage) = stages.iter().position(|s| s.tasks().contains(&task)) else {
             return Err(PipelineError::Option { option: "task", value: task.to_string() });
         };
-        if folder.stage()? > stage || is_done(&folder, &plan, task)? {
+        let is_committed = folder.stage()? > stage || folder.committed()?.contains(&task);
+        if is_committed || is_done(&folder, &plan, task)? {
             return Ok(Performed::Already);
         }
         let orders = orders_of(&folder, &plan, task, patience)?;
@@ -254,9 +255,9 @@ impl<'a> Attempt<'a> {
             };
             Ok((zones, worker.perform(order, share, watch)?))
         };
-        work_off(
+        run_jobs(
             jobs.collect(),
-            &vec![run as Hand<(WorkOrder, Plan), Below>; share.workers()],
+            &vec![run as WorkerFn<(WorkOrder, Plan), Below>; share.workers()],
             watch,
             &mut |(zones, receipt)| {
                 let mut next = Vec::new();

@@ -12,7 +12,7 @@ use crate::pipeline::plan::{MeshOptions, Options, Plan, RECIPE};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::tree::corners;
 use crate::pipeline::work::common::Common;
-use crate::pipeline::work::{Helpers, Worker, Workplace};
+use crate::pipeline::work::{Worker, WorkerPool, Workplace};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::RemoteFailure;
 use tetdb_base::storage::{Budget, DiskPath, RunContext, ScratchSpace, attempt};
@@ -27,7 +27,7 @@ const WAIT: Duration = Duration::from_secs(60);
 /// Starts the remote workers; returns the number of orders they perform at once. Effects: writes the size field to the store's
 /// folder of tasks. Errors: the disk; those of the remote workers.
 pub fn begin(
-    helpers: &dyn Helpers,
+    pool: &dyn WorkerPool,
     catalog: &mut Catalog,
     options: &Options,
     bounds: &Aabb,
@@ -43,18 +43,18 @@ pub fn begin(
         bounds: corners(bounds),
         options: serde_json::to_string(&options.mesh).unwrap_or_default(),
     };
-    Ok(helpers.begin(&to_bytes(WorkKind::Plan, &run))?)
+    Ok(pool.begin(&to_bytes(WorkKind::Plan, &run))?)
 }
 
 /// Sends an order to a remote worker; returns its receipt once the written files are visible. Errors: those of the remote worker;
 /// a receipt that cannot be read; a missing file.
 pub fn ask(
-    helpers: &dyn Helpers,
+    pool: &dyn WorkerPool,
     slot: usize,
     order: &WorkOrder,
     store: &DiskPath,
 ) -> Result<Receipt, PipelineError> {
-    let bytes = helpers.perform(slot, to_bytes(WorkKind::Orders, order))?;
+    let bytes = pool.perform(slot, to_bytes(WorkKind::Orders, order))?;
     let receipt: Receipt = from_bytes(WorkKind::Receipts, &bytes)
         .map_err(|e| damaged(store, &format!("a receipt: {e}")))?;
     let patience = Patience::of(WAIT);

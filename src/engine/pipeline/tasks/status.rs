@@ -88,8 +88,9 @@ pub fn status(store: &Path) -> Result<Option<Planned>, PipelineError> {
     let stages = stages(plan.n, plan.tasks);
     let stage = folder.stage()?;
     let range = stages.get(stage).map_or(0..0, Stage::tasks);
-    // Tasks without orders have been committed.
-    let open = range.filter(|&task| folder.orders_path(task).exists());
+    let committed = folder.committed()?;
+    let is_open = |task: &u32| !committed.contains(task) && folder.orders_path(*task).exists();
+    let open = range.filter(is_open);
     let states = open.map(|task| Ok((task, state(&folder, plan.run, task)?)));
     Ok(Some(Planned {
         subdomains: plan.n,

@@ -9,7 +9,7 @@ pub(super) mod coarse_snapshot;
 pub(super) mod common;
 mod cut;
 mod cut_journal;
-mod helpers;
+mod remote;
 mod saturate;
 pub(super) mod soundness;
 pub(super) mod stages;
@@ -17,7 +17,7 @@ pub(super) mod subdomain;
 pub(super) mod traffic;
 mod worker;
 
-pub use helpers::{Hands, Helpers};
+pub use remote::{RemoteWorkers, WorkerPool};
 pub use saturate::FineReport;
 pub use stages::stage_faces;
 pub(super) use worker::{Worker, Workplace};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tetdb_base::storage::RemoteFailure;
 
 /// Processes that perform orders while this one holds the store's lock. The implementation transports the bytes.
-pub trait Helpers: Send + Sync {
+pub trait WorkerPool: Send + Sync {
     /// Sends the parameters common to all orders; returns how many orders the workers perform at once, in total. Errors: a
     /// failure, in words.
     fn begin(&self, job: &[u8]) -> Result<usize, RemoteFailure>;
@@ -16,15 +16,15 @@ pub trait Helpers: Send + Sync {
 
 /// The remote workers of a run, if it has any. The mesh does not depend on them, so all values compare equal.
 #[derive(Clone, Default)]
-pub struct Hands(pub Option<Arc<dyn Helpers>>);
+pub struct RemoteWorkers(pub Option<Arc<dyn WorkerPool>>);
 
-impl fmt::Debug for Hands {
+impl fmt::Debug for RemoteWorkers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.0.is_some() { "Hands" } else { "no hands" })
+        f.write_str(if self.0.is_some() { "RemoteWorkers" } else { "no remote workers" })
     }
 }
 
-impl PartialEq for Hands {
+impl PartialEq for RemoteWorkers {
     fn eq(&self, _: &Self) -> bool {
         true
     }
