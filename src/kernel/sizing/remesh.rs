@@ -88,22 +88,20 @@ impl SizeField {
             slope_factor: Some(slope_factor),
             scratch,
         };
-        let (mut at_skin, nearest) = sizes.gather(|seeds, v| seeds.h(v), true);
+        let (mut at_skin, nearest) = sizes.gather(|seeds, v| seeds.h(v));
         for i in 0..at_skin.len() {
             if at_skin.get(i).is_finite() {
                 at_skin.set(i, current.get(i));
             }
         }
-        let cones = nearest.map(|nearest| sizes.cones(&mut at_skin, nearest));
+        let [mut upper, mut lower] = sizes.cones(&mut at_skin, nearest);
         let mut h = sizes.fill(wanted);
-        if let Some([mut lower, mut upper]) = cones {
-            for i in 0..h.len() {
-                let current = current.get(i);
-                let wanted = Some(h.get(i)).filter(|h| h.is_finite()).unwrap_or(current);
-                // Rounded slopes must not change the current lengths.
-                let (low, high) = (lower.get(i).min(current), upper.get(i).max(current));
-                h.set(i, wanted.max(low).min(high));
-            }
+        for i in 0..h.len() {
+            let current = current.get(i);
+            let wanted = Some(h.get(i)).filter(|h| h.is_finite()).unwrap_or(current);
+            // Rounded slopes must not change the current lengths.
+            let (low, high) = (lower.get(i).min(current), upper.get(i).max(current));
+            h.set(i, wanted.max(low).min(high));
         }
         sizes.grading().grade_closed(&mut h);
         Ok(Some(Self::from_corners(frame, beta, tree, corners, h, scratch)))

@@ -549,3 +549,47 @@ fn sizes_grow_from_a_speck_far_from_all_others() {
         }
     }
 }
+
+#[test]
+fn a_bound_that_is_never_reached_changes_nothing() {
+    let balls = SampleSpec::parse("balls,count=20").unwrap().make().unwrap();
+    let surfaces = [
+        cube(3, |i| i as f64 / 3.0),
+        graded(100.0, 20),
+        specks(1e-3, &[Point::new(0.3, 0.4, 0.6)]),
+        (balls.points, balls.triangles),
+    ];
+    for (points, triangles) in surfaces {
+        let bytes = |hmin, hmax| {
+            let options = options(None, hmin, hmax);
+            SizeField::build(&points, &triangles, &options).unwrap().to_bytes()
+        };
+        let free = bytes(None, None);
+        assert!(bytes(None, Some("1e6")) == free, "{} points: hmax", points.len());
+        assert!(bytes(Some("1e-9"), None) == free, "{} points: hmin", points.len());
+    }
+}
+
+/// Many small places: on a helix, in a bed.
+#[test]
+fn fine_places_leave_the_interior_coarse() {
+    let helix = (0..300).map(|i| {
+        let (sin, cos) = (0.1 * f64::from(i)).sin_cos();
+        Point::new(0.5 + 0.2 * cos, 0.5 + 0.2 * sin, 0.1 + 0.8 * f64::from(i) / 300.0)
+    });
+    let bed = (0..300).map(|i| {
+        let at = |k: i32, step: f64| 0.2 + 0.6 * (f64::from(i * k) * step).fract();
+        Point::new(at(1, 0.618), at(1, 0.7548), 0.2 + 0.1 * at(1, 0.5698))
+    });
+    let sets: [Vec<Point>; 2] = [helix.collect(), bed.collect()];
+    for (set, places) in sets.iter().enumerate() {
+        let field = build(&specks(5e-3, places), &SizeOptions::default());
+        let mut dice = Dice(7);
+        for _ in 0..2000 {
+            let p = dice.point();
+            let away = places.iter().map(|q| p.distance(*q)).fold(f64::INFINITY, f64::min);
+            let (h, grown) = (field.h(p), field.beta() * away);
+            assert!(h > 0.35 * grown.min(0.2), "set {set}: {h} at {away}, {grown} is allowed");
+        }
+    }
+}
