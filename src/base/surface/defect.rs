@@ -48,6 +48,12 @@ pub enum SurfaceError {
         /// Number of vertices.
         n_vertices: usize,
     },
+    /// A face of a mesh of volume cells belongs to more than two of them.
+    #[error("cells {}, {} and {} share a face", cells[0], cells[1], cells[2])]
+    SharedFace {
+        /// Three of them.
+        cells: [u32; 3],
+    },
     /// The surface is too small to compute with exactly.
     #[error(
         "the surface is too small to compute with exactly: its longest extent is {extent:e}, expected above 1e-24"
@@ -93,6 +99,7 @@ impl SurfaceError {
             Self::TooLarge { .. } => Code::SurfaceTooLarge,
             Self::Memory { .. } | Self::EmbedMemory { .. } => Code::Memory,
             Self::NoSuchVertex { .. } => Code::IndexOutOfRange,
+            Self::SharedFace { .. } => Code::UnsupportedContent,
             Self::TooSmall { .. } => Code::CoordinateRange,
             Self::Invalid { defect, .. } => defect.code(),
             Self::Embed(wire) => wire.code(),
@@ -106,6 +113,7 @@ impl SurfaceError {
             Self::Memory { .. } => "allow more memory, or take a coarser surface",
             Self::EmbedMemory { .. } => "allow more memory, or take fewer edges and points",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
+            Self::SharedFace { .. } => "remove cells that are there twice or overlap others",
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),
             Self::Embed(wire) => wire.help(),

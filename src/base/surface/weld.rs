@@ -159,10 +159,15 @@ impl SurfaceBuilder {
         self.surface.seeds.push(seed);
     }
 
+    /// The vertex of the surface that vertex `v` of the current file is, where the file has it.
+    pub(super) fn vert(&self, v: u32) -> Option<u32> {
+        self.file2vert.get(v as usize).copied()
+    }
+
     /// The middle of four vertices of the current file, where it has them.
     pub fn middle(&self, corners: [u32; 4]) -> Option<Point> {
         let point = |v: u32| {
-            let vert = *self.file2vert.get(v as usize)?;
+            let vert = self.vert(v)?;
             self.surface.points.get(vert as usize).copied()
         };
         let mut sum = Point::ZERO;

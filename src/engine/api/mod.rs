@@ -104,6 +104,7 @@ pub use sizes::Sizes;
 pub use store::{Store, Summary};
 pub use suggestions::Suggestion;
 pub use surface::{CheckReport, Surface};
+pub use surface_arrays::CellArrays;
 pub use surface_repair::{RepairReport, WELD_SHARE_MAX};
 pub use surface_report::SurfaceReport;
 pub use targets::{check_target, inputs_of};

@@ -138,7 +138,14 @@ impl Surface {
                 .with_help("give one label for each triangle"));
         }
         guarded(&Settings::new(), || {
-            Self::built(points, triangles, labels)?.oriented(&ScratchSpace::boundless())
+            let add = |builder: &mut SurfaceBuilder| {
+                for (i, triangle) in triangles.iter().enumerate() {
+                    let label = builder.label(labels.map_or("surface", |labels| labels[i]));
+                    builder.triangle(*triangle, label)?;
+                }
+                Ok(())
+            };
+            Self::built(points, add)?.oriented(&ScratchSpace::boundless())
         })
     }
 
@@ -316,8 +323,8 @@ impl Surface {
         Ok(self)
     }
 
-    /// Notes on how the surface was read.
-    pub(super) fn notes(&self) -> Vec<String> {
+    /// Notes on how the surface was read: what was left out, cut, joined or turned.
+    pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.inner.notes.iter().map(ToString::to_string).collect();
         if self.turned > 0 {
             notes
@@ -446,10 +453,10 @@ impl Surface {
         Ok(Self::of(inner, sources))
     }
 
-    fn built(
+    /// A surface from arrays: its vertices are `points`, the rest is what `add` adds.
+    pub(super) fn built(
         points: &[[f64; 3]],
-        triangles: &[[u32; 3]],
-        labels: Option<&[&str]>,
+        add: impl FnOnce(&mut SurfaceBuilder) -> Result<(), Error>,
     ) -> Result<Self, Error> {
         let mut builder = SurfaceBuilder::new();
         builder.begin_file("arrays");
@@ -460,11 +467,7 @@ impl Surface {
             }
             builder.vertex(Point::from_array(*point))?;
         }
-        for (i, triangle) in triangles.iter().enumerate() {
-            let name = labels.map_or("surface", |labels| labels[i]);
-            let label = builder.label(name);
-            builder.triangle(*triangle, label)?;
-        }
+        add(&mut builder)?;
         builder.end_file()?;
         let inner = builder.finish();
         Ok(Self::given(inner))
