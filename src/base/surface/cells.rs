@@ -1,12 +1,13 @@
 //! The boundary of a mesh of volume cells as a surface: faces of one cell, and faces between two regions.
 //!
 //! Faces are matched by the positions of their corners, so cells with vertices of their own at the same places are neighbors. Each
-//! volume of cells that hang together by faces, and are of one region, gets a seed.
+//! volume of cells that hang together by faces, and are of one region, has a point returned.
 //! Is not: a check of the cells; what their boundary does not close, validation reports.
 
 use std::collections::HashMap;
 
-use super::{Seed, SeedKind, SurfaceBuilder, SurfaceError};
+use super::{SurfaceBuilder, SurfaceError};
+use crate::geom::Point;
 use crate::sort_record;
 use crate::storage::{OrRaise, ScratchSpace, Sorter, SpillVec, check_cancelled};
 
@@ -130,7 +131,8 @@ impl CellBoundary {
 
     /// Adds the boundary to the current file of `builder`; `label` gives the id of a name, which is empty where no region has one.
     ///
-    /// A face of one cell has the name of its region, one between two regions both names.
+    /// A face of one cell has the name of its region, one between two regions both names. Returns a point in each volume, with the
+    /// name of its region.
     ///
     /// # Errors
     /// A face of three cells; the builder's. Unwinds where the disk fails.
@@ -138,7 +140,7 @@ impl CellBoundary {
         self,
         builder: &mut SurfaceBuilder,
         mut label: impl FnMut(&mut SurfaceBuilder, &str) -> u32,
-    ) -> Result<(), SurfaceError> {
+    ) -> Result<Vec<(Point, String)>, SurfaceError> {
         let mut volumes = self.space.vec(self.n_cells as usize, 0u32);
         (0..self.n_cells).for_each(|cell| volumes.set(cell as usize, cell));
         // Cell, region, three corners of an outer face and one inside.
@@ -176,6 +178,7 @@ impl CellBoundary {
             }
         }
         let mut outer = outer.finish();
+        let mut seeds = Vec::new();
         let mut seeded = self.space.vec(self.n_cells as usize, 0u8);
         for i in 0..outer.len() {
             let [cell, region, a, b, c, apex] = outer.get(i);
@@ -184,13 +187,11 @@ impl CellBoundary {
                 continue;
             }
             seeded.set(volume, 1);
-            let name = &self.regions[region as usize];
             if let Some(point) = builder.middle([a, b, c, apex]) {
-                let kind = SeedKind::Region((!name.is_empty()).then(|| name.clone()));
-                builder.seed(Seed { point, kind });
+                seeds.push((point, self.regions[region as usize].clone()));
             }
         }
-        Ok(())
+        Ok(seeds)
     }
 }
 
@@ -210,8 +211,7 @@ fn root(volumes: &mut SpillVec<u32>, mut cell: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::Point;
-    use crate::surface::{Surface, closedness};
+    use crate::surface::{Seed, SeedKind, Surface, closedness};
 
     /// The boundary of cells with the names of their regions, in `space`.
     fn boundary(
@@ -227,7 +227,9 @@ mod tests {
             let region = all.region(name);
             all.cell(&builder, corners, region)?;
         }
-        all.finish(&mut builder, |builder, name| builder.label(name))?;
+        for (point, name) in all.finish(&mut builder, |builder, name| builder.label(name))? {
+            builder.seed(Seed { point, kind: SeedKind::Region(Some(name)) });
+        }
         builder.end_file()?;
         Ok(builder.finish())
     }

@@ -2,7 +2,7 @@
 
 use super::{Error, Settings, Surface, guarded};
 use tetdb_base::storage::ScratchSpace;
-use tetdb_base::surface::{CellBoundary, Note, NoteKind, Seed, SurfaceBuilder};
+use tetdb_base::surface::{CellBoundary, Note, NoteKind, Seed, SeedKind, SurfaceBuilder};
 use tetdb_schema::code::Code;
 
 /// Cells of several kinds as arrays.
@@ -91,10 +91,14 @@ impl Surface {
                     boundary.cell(builder, corners, region)?;
                 }
                 let n = u64::from(boundary.n_cells());
-                boundary.finish(builder, |builder, name| match name {
+                let seeds = boundary.finish(builder, |builder, name| match name {
                     "" => builder.label("surface"),
                     name => builder.label(name),
                 })?;
+                for (point, name) in seeds {
+                    let kind = SeedKind::Region((!name.is_empty()).then_some(name));
+                    builder.seed(Seed { point, kind });
+                }
                 builder.note(NoteKind::BoundaryOfCells { n });
                 Ok(())
             };

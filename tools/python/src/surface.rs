@@ -34,6 +34,11 @@ impl Surface {
     }
 
     #[staticmethod]
+    fn boundary_of(py: Python<'_>, file: PathBuf) -> PyResult<Self> {
+        made(py, || tetdb::Surface::boundary_of(file))
+    }
+
+    #[staticmethod]
     fn sample(py: Python<'_>, spec: String) -> PyResult<Self> {
         made(py, || tetdb::Surface::sample(&spec))
     }
@@ -229,8 +234,11 @@ impl Surface {
         })
     }
 
-    fn write(&self, py: Python<'_>, out: PathBuf) -> PyResult<()> {
-        let work = || Ok(self.inner.write(out).map(|_| ())?);
+    /// Returns what the file does not keep: labels, numbers of embedded edges and points, and of seeds.
+    fn write(&self, py: Python<'_>, out: PathBuf) -> PyResult<(bool, usize, usize)> {
+        let n_inside = self.inner.n_embedded().iter().sum();
+        let n_seeds = self.inner.seeds().len();
+        let work = || Ok((!self.inner.write(out)?.labels_kept, n_inside, n_seeds));
         watched(py, &CancelToken::new(), None, work)
     }
 }

@@ -103,6 +103,38 @@ def test_regions_of_volume_cells_stay_apart(tmp_path: Any) -> None:
         assert back.n_triangles == sum(len(store.subdomain(0).facets) for _ in range(1))
 
 
+def test_files_of_volume_cells_give_their_boundary(tmp_path: Any) -> None:
+    meshio = pytest.importorskip("meshio")
+    points = np.concatenate([CUBE, CUBE + [1, 0, 0]])
+    cells = [("hexahedron", np.concatenate([HEXAHEDRON, HEXAHEDRON + 8])), ("quad", QUADS[:1])]
+    mesh = meshio.Mesh(points, cells, cell_data={"medit:ref": [np.array([1, 2]), np.array([5])]})
+    mesh.write(tmp_path / "a.mesh")
+    with pytest.warns(UserWarning):
+        whole = tetdb.Surface.boundary_of(mesh)
+    read = tetdb.Surface.boundary_of(tmp_path / "a.mesh")
+    for surface in (whole, read):
+        assert surface.n_triangles == 20 + 2 and set(surface.labels) == {"ref_1", "ref_2", "ref_1-ref_2"}
+    with tetdb.mesh(read, tmp_path / "s", regions="all") as store:
+        assert [r.volume for r in store.regions if r.filled] == pytest.approx([1, 1])
+        store.export(tmp_path / "b.msh")
+        back = tetdb.Surface.boundary_of(tmp_path / "b.msh")
+        assert back.n_triangles == 22 and {"ref_1", "ref_2"} <= set("-".join(back.labels).split("-"))
+
+
+def test_arrays_of_a_store_hold_each_cell_once(tmp_path: Any) -> None:
+    sheet = tetdb.Surface([[0.25, 0.25, 0.5], [0.75, 0.25, 0.5], [0.75, 0.75, 0.5]], [[0, 1, 2]])
+    well = [[0.1, 0.9, 0.9], [0.1, 0.9, 0.5], [0.2, 0.8, 0.2]], [[0, 1], [1, 2]]
+    surface = tetdb.sample("box,h=0.5")
+    with tetdb.mesh(surface, tmp_path / "s", embed={"crack": sheet}, embed_edges={"well": well}) as store:
+        labels = np.array(store.labels)[store.subdomain(0).facets["label"]]
+        assert len(labels) == surface.n_triangles + 1 and list(labels).count("crack") == 1 and "well" not in labels
+        assert len(store.merged([0, 0]).tets) == store.n_tets == store.to_pyvista([0, 0, 0]).n_cells
+    with pytest.warns(UserWarning, match="embedded edges"):
+        surface.embedded_edges(well, "well").write(tmp_path / "a.obj")
+    with pytest.warns(UserWarning, match="labels"):
+        surface.write(tmp_path / "a.off")
+
+
 def test_labels_of_meshio_are_kept() -> None:
     meshio = pytest.importorskip("meshio")
     names = np.array(["floor", "a", "a", "b"])

@@ -157,9 +157,11 @@ class Surface:
 
         Parameters
         ----------
-        mesh : mesh
-            Of PyVista, VTK or meshio, with tetrahedra, pyramids, prisms or hexahedra.
+        mesh : mesh or path
+            Of PyVista, VTK or meshio, with tetrahedra, pyramids, prisms or hexahedra; or a ``.msh``, ``.mesh``, ``.meshb`` or ``.ele`` file.
         """
+        if _is_path(mesh):
+            return cls._of(_native.Surface.boundary_of(os.fspath(mesh)))
         return cls._of(_of_cells(_cells.of_mesh(mesh, volume_only=True), None))
 
     @classmethod
@@ -299,8 +301,11 @@ class Surface:
         return both
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Writes ``.stl``, ``.off``, ``.obj`` or ``.ply``."""
-        self._inner.write(os.fspath(path))
+        """Writes ``.stl``, ``.off``, ``.obj`` or ``.ply``; warns of labels, embedded edges and points, and seeds that the file does not keep."""
+        labels, n_inside, n_seeds = self._inner.write(os.fspath(path))
+        for n, what in ((labels, "labels"), (n_inside, "embedded edges and points"), (n_seeds, "points that mark regions and holes")):
+            if n:
+                warnings.warn(f"{os.fspath(path)} does not keep {what}", stacklevel=2)
 
     def estimate(
         self,
