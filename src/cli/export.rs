@@ -203,7 +203,9 @@ pub fn write(
     console: &Console,
 ) -> Result<(), Failure> {
     let store = Store::open_with(path, settings.clone())?;
-    reported(store.export(out, &ExportOptions::new().over_inputs())?, console);
+    let options = ExportOptions::new().over_inputs();
+    note_numbers(options.check(out)?, &store, console);
+    reported(store.export(out, &options)?, console);
     Ok(())
 }
 

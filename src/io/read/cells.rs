@@ -179,7 +179,7 @@ mod tests {
         for (name, text) in files {
             std::fs::write(dir.path().join(name), text).unwrap();
         }
-        let path = dir.path().join(&files[0].0).to_string_lossy().into_owned();
+        let path = dir.path().join(files[0].0).to_string_lossy().into_owned();
         read_surface_in(
             &[PathBuf::from(format!("{word}{path}"))],
             &ScratchSpace::new(1 << 30, dir.path()),
