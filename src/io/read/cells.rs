@@ -5,33 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::feed::{Feed, Result, name};
 use super::tetgen::read_node_file;
+use super::volume_cells::VolumeCells;
 use super::{ReadFault, SurfaceSink};
-use tetdb_base::storage::ScratchSpace;
-use tetdb_base::surface::{CellBoundary, NoteKind, Seed, SeedKind};
+use tetdb_base::surface::{NoteKind, Seed, SeedKind};
 use tetdb_schema::source::BOUNDARY_OF;
-
-/// The volume cells of the file being read.
-#[derive(Default)]
-pub struct VolumeCells {
-    /// Number of cells left out.
-    n_left_out: u64,
-    /// Their boundary, where it is the surface.
-    boundary: Option<CellBoundary>,
-    n_faces: u64,
-    n_curved: u64,
-}
-
-impl VolumeCells {
-    /// Cells whose boundary is the surface.
-    pub(super) fn bounding(space: &ScratchSpace) -> Self {
-        Self { boundary: Some(CellBoundary::new(space)), ..Self::default() }
-    }
-
-    /// Returns whether the boundary of cells is the surface, and other faces are not.
-    pub(super) fn are_wanted(&self) -> bool {
-        self.boundary.is_some()
-    }
-}
 
 impl SurfaceSink<'_> {
     /// Counts cells that are left out, so that the file may be read again for their boundary.
@@ -162,6 +139,7 @@ where
 mod tests {
     use super::super::{read_surface, read_surface_in};
     use super::*;
+    use tetdb_base::storage::ScratchSpace;
     use tetdb_base::surface::{Surface, closedness};
 
     /// Two tetrahedra on one another, each of its reference, and a triangle.

@@ -22,6 +22,7 @@ mod sink;
 mod sizes;
 mod stl;
 mod tetgen;
+mod volume_cells;
 mod vtk;
 
 #[cfg(test)]
@@ -32,7 +33,6 @@ mod tests;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
-use cells::VolumeCells;
 pub use cells::boundary_of;
 pub use embedded::read_wires;
 pub use embedded_sink::WireKind;
@@ -43,6 +43,7 @@ pub use open::is_stream;
 use open::{open, stem, unpacked_name};
 use sink::SurfaceSink;
 pub use sizes::{FileSizes, read_sizes, size_files};
+use volume_cells::VolumeCells;
 
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{Surface, SurfaceBuilder, SurfaceError};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::cells::VolumeCells;
+use super::volume_cells::VolumeCells;
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceBuilder, VolumePoints};
 
