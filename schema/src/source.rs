@@ -16,7 +16,7 @@ pub struct Source {
 /// Where a part of a surface came from. Later parts build on the parts before them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Origin {
-    /// A file, by its absolute path.
+    /// A file, by its absolute path, behind [`BOUNDARY_OF`] if the boundary of its volume cells is the surface.
     File(String),
     /// A generated surface, by its specification.
     Sample(String),
@@ -45,6 +45,8 @@ pub struct NamedFile {
     pub file: String,
 }
 
+/// Before the path of a file whose volume cells bound the surface.
+pub const BOUNDARY_OF: &str = "boundary-of:";
 const SAMPLE: &str = "sample:";
 const COPY: &str = "store:surface.obj";
 const SHEET: &str = "sheet:";
@@ -112,8 +114,10 @@ impl Origin {
     /// The file that the part can be read from again.
     pub fn file(&self) -> Option<&str> {
         match self {
-            Self::File(file) => Some(file),
-            Self::Sheet(of) | Self::Edges(of) | Self::Points(of) => Some(&of.file),
+            Self::File(file) => Some(file.strip_prefix(BOUNDARY_OF).unwrap_or(file)),
+            Self::Sheet(of) | Self::Edges(of) | Self::Points(of) => {
+                Some(of.file.strip_prefix(BOUNDARY_OF).unwrap_or(&of.file))
+            }
             _ => None,
         }
     }
@@ -132,6 +136,7 @@ mod tests {
     fn rows_come_back_as_they_were() {
         for path in [
             "/home/a/part.stl",
+            "boundary-of:/home/a/part.msh",
             "sample:box,h=0.1",
             "store:surface.obj",
             "sheet:north=/home/a/fault=1.stl",
@@ -146,7 +151,7 @@ mod tests {
             assert_eq!(source.to_record(), row);
             assert_eq!(
                 source.origin.is_inside(),
-                !path.starts_with(['/', 's']) || path.starts_with("sheet")
+                !path.starts_with(['/', 's', 'b']) || path.starts_with("sheet")
             );
         }
         for path in ["sheet:nofile", "sheets-from:x", "wires:1"] {

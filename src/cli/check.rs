@@ -1,6 +1,6 @@
 //! The command `check`: reports whether a surface can be meshed, how to repair it, and what mesh it allows.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -10,6 +10,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::input;
 use super::memory;
+use super::words;
 use tetdb_engine::api::targets::check_target;
 use tetdb_engine::api::{Code, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short};
 
@@ -51,7 +52,9 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
         if let Some(repair) = &repair {
             print_repair(repair, console);
         }
-        let (surfaces, is_repaired) = (&args.surfaces.join(" "), repair.is_some());
+        let surfaces: Vec<String> =
+            args.surfaces.iter().map(|word| words::quoted(Path::new(word))).collect();
+        let (surfaces, is_repaired) = (&surfaces.join(" "), repair.is_some());
         Printed { surface: &surface, report: &report, surfaces, is_repaired }.print(console);
     }
     Ok(if report.is_valid() { 0 } else { 3 })
@@ -105,9 +108,7 @@ fn write_files(
             n => format!("validated again, still with {n} defects"),
         };
         console.note(&format!("wrote {}: {state}", out.display()));
-        if !written.labels_kept {
-            console.note("note: this format has no place for the labels");
-        }
+        input::note_lost(surface, written, console);
         fields.push((
             "written",
             json!({ "file": out.display().to_string(), "bytes": written.bytes, "labels_kept": written.labels_kept }),

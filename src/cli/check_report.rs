@@ -77,7 +77,7 @@ impl Printed<'_> {
             console.line(&format!("{code}: {n}"));
             for defect in kind.iter().take(LISTED) {
                 let at = defect.at().map_or(String::new(), |p| format!(", near {}", show_point(p)));
-                console.line(&format!("  {defect}{at}"));
+                console.line(&format!("  {}{at}", self.report.defect_in_words(defect)));
             }
             print_rest(n, console);
         }
@@ -95,7 +95,7 @@ impl Printed<'_> {
                 "  {} edges, length {}, at triangle {} near {}",
                 edge_loop.n_edges,
                 short(edge_loop.length),
-                edge_loop.triangle,
+                self.report.triangle_name(edge_loop.triangle),
                 show_point(edge_loop.at)
             ));
         }
@@ -112,7 +112,7 @@ impl Printed<'_> {
             console.line(&format!(
                 "  a vertex at {} lies on an open edge of triangle {}, {how}",
                 show_point(junction.at),
-                junction.triangle
+                self.report.triangle_name(junction.triangle)
             ));
         }
         print_rest(junctions.len() as u64, console);
@@ -181,7 +181,7 @@ impl Printed<'_> {
             if f.forcing_triangles > 0 && least.is_finite() {
                 console.line(&format!(
                     "worst: no tetrahedron on triangle {} at ({}, {}, {}) can have a quality below {}",
-                    f.worst_triangle,
+                    self.report.triangle_name(f.worst_triangle),
                     short(x),
                     short(y),
                     short(z),

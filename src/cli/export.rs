@@ -94,6 +94,9 @@ fn write_share(
     let store = Store::open_with(&args.store, settings)?;
     let mut reports = Vec::new();
     for (out, of_ranks, is_ours, writers) in outs {
+        if is_ours {
+            note_numbers(options.check(out)?, &store, console);
+        }
         let options = match of_ranks.filter(|_| args.share.is_none()) {
             Some(Share { number, of }) => options.clone().share(number, of),
             None => options.clone(),
@@ -200,8 +203,21 @@ pub fn write(
     console: &Console,
 ) -> Result<(), Failure> {
     let store = Store::open_with(path, settings.clone())?;
-    reported(store.export(out, &ExportOptions::new().over_inputs())?, console);
+    let options = ExportOptions::new().over_inputs();
+    note_numbers(options.check(out)?, &store, console);
+    reported(store.export(out, &options)?, console);
     Ok(())
+}
+
+/// Says that a format has numbers only where the store has names.
+fn note_numbers(format: MeshFormat, store: &Store, console: &Console) {
+    use MeshFormat::{Medit, MeditBinary, Numpy, TetGen};
+    let is_name = |name: &String| name.parse::<u64>().is_err();
+    if matches!(format, Medit | MeditBinary | Numpy | TetGen)
+        && store.summary().labels.iter().any(is_name)
+    {
+        console.note("note: this format has numbers in place of the names of labels and regions, in the order of `tetdb info`");
+    }
 }
 
 fn reported(exported: Exported, console: &Console) -> Exported {

@@ -81,7 +81,7 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         return Ok(());
     }
     if !info.finished {
-        console.line(&format!("`tetdb resume {}` goes on with it", path.display()));
+        console.line(&format!("`tetdb resume {}` goes on with it", words::quoted(path)));
         return Ok(());
     }
     console.line(&format!(

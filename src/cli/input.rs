@@ -6,7 +6,7 @@ use super::args::SheetArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::words::count;
-use tetdb_engine::api::{Code, EmbeddedKind, Settings, Surface};
+use tetdb_engine::api::{Code, EmbeddedKind, Settings, Surface, SurfaceWritten};
 
 /// The same settings, with temporary files in the folder of `file` or its nearest existing parent.
 pub fn scratch_beside(settings: Settings, file: &Path) -> Settings {
@@ -15,6 +15,16 @@ pub fn scratch_beside(settings: Settings, file: &Path) -> Settings {
     match above.into_iter().find(|folder| folder.is_dir()) {
         Some(folder) => settings.scratch(folder),
         None => settings,
+    }
+}
+
+/// Says what of a surface its file does not keep.
+pub fn note_lost(surface: &Surface, written: SurfaceWritten, console: &Console) {
+    if !written.labels_kept {
+        console.note("note: this format has no place for the labels");
+    }
+    if !surface.seeds().is_empty() {
+        console.note("note: points that mark regions and holes are not written");
     }
 }
 

@@ -8,10 +8,11 @@ use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::input;
+use super::words::quoted;
 use super::{config, export, info, memory, threads};
 use tetdb_engine::api::targets::{check_target, inputs_of};
 use tetdb_engine::api::{
-    Code, Existing, Mesher, PageTraffic, SAMPLE_PREFIX, Settings, resume_reported,
+    BOUNDARY_PREFIX, Code, Existing, Mesher, PageTraffic, SAMPLE_PREFIX, Settings, resume_reported,
 };
 
 pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
@@ -66,8 +67,8 @@ fn begun(path: &Path, settings: &Settings, console: &Console) -> Result<u8, Fail
         answer["peak_bytes"] = json!(memory::peak());
         console.answer(&answer);
     } else if !console.is_quiet() {
-        let store = path.display();
-        console.line(&format!("{store}: the coarse mesh is there"));
+        let store = quoted(path);
+        console.line(&format!("{}: the coarse mesh is there", path.display()));
         console.note(&format!(
             "next: `tetdb plan {store} --tasks N` makes tasks of the rest, `tetdb resume {store}` does it here"
         ));
@@ -106,6 +107,7 @@ pub(super) fn begin(
 fn output(args: &MeshArgs) -> PathBuf {
     args.output.clone().unwrap_or_else(|| {
         let first = args.surfaces.first().map_or("mesh", String::as_str);
+        let first = first.strip_prefix(BOUNDARY_PREFIX).unwrap_or(first);
         let stem = match first.strip_prefix(SAMPLE_PREFIX) {
             Some(sample) => sample.split(',').next().map(Into::into),
             None => Path::new(first).file_stem().map(PathBuf::from),
@@ -140,7 +142,7 @@ fn finish(
             console.line(&format!("peak memory {} of {}", memory::show(peak), memory::show(cap)));
         }
         let page = path.with_extension("html");
-        let (store, page) = (path.display(), page.display());
+        let (store, page) = (quoted(path), quoted(&page));
         console.note(&format!(
             "next: `tetdb report {store} {page}` shows it in a browser, `tetdb export {store} FILE.vtu` writes it for other programs"
         ));

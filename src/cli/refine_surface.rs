@@ -28,7 +28,8 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     let settings = input::scratch_beside(settings, &args.output);
     let surface = Surface::load(std::slice::from_ref(&args.surface), &settings)?;
     let (fine, report) = surface.refined_with(h, sizes.hgrad, &settings)?;
-    fine.write(&args.output)?;
+    let written = fine.write(&args.output)?;
+    input::note_lost(&surface, written, console);
     let (triangles, vertices) = (fine.n_triangles(), fine.n_vertices());
     if console.is_json() {
         console.answer(&json!({

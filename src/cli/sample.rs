@@ -9,6 +9,7 @@ use serde_json::json;
 use super::args::SampleArgs;
 use super::console::Console;
 use super::failure::Failure;
+use super::words::quoted;
 use super::{input, memory};
 use tetdb_engine::api::targets::check_target;
 use tetdb_engine::api::{Code, SAMPLE_PREFIX as PREFIX, Settings, Surface};
@@ -75,7 +76,7 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         let file = sibling(&args.output, "sheets", None);
         check_target(&file, &[])?;
         sheets.write(&file)?;
-        embed += &format!(" --embed {}", file.display());
+        embed += &format!(" --embed {}", quoted(&file));
     }
     let [edges, points] = surface.n_embedded();
     if edges + points > 0 {
@@ -84,16 +85,17 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         surface.write_embedded(&file)?;
         for (option, n) in [("edges", edges), ("points", points)] {
             if n > 0 {
-                embed += &format!(" --embed-{option} {}", file.display());
+                embed += &format!(" --embed-{option} {}", quoted(&file));
             }
         }
     }
-    match embed.is_empty() {
+    let written = match embed.is_empty() {
         true => surface.write(&args.output)?,
         false => shell.write(&args.output)?,
     };
+    input::note_lost(&surface, written, console);
     if !embed.is_empty() {
-        let shell = args.output.display();
+        let shell = quoted(&args.output);
         console.note(&format!("what is inside has files of its own: `tetdb mesh {shell}{embed}`"));
     }
     let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());

@@ -4,8 +4,9 @@
 //! continues.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use super::words::{quoted, single_quoted};
 use tetdb_engine::api::{TaskStage, TaskStatus};
 
 /// Memory of a task that does not count towards its cap: code and stacks.
@@ -209,18 +210,4 @@ impl Script<'_> {
         }
         text
     }
-}
-
-/// A path quoted for the shell.
-fn quoted(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:@%".contains(c);
-    match !text.is_empty() && text.chars().all(is_plain) {
-        true => text.into_owned(),
-        false => single_quoted(&text),
-    }
-}
-
-fn single_quoted(text: &str) -> String {
-    format!("'{}'", text.replace('\'', r"'\''"))
 }

@@ -1,6 +1,7 @@
 //! Counts, lists and sizes as text.
 
 use std::borrow::Cow;
+use std::path::Path;
 
 use tetdb_engine::api::short;
 
@@ -43,6 +44,21 @@ pub fn shortened(text: &str) -> Cow<'_, str> {
     let begin = text.chars().take(TEXT_MAX / 2);
     let end = text.chars().skip(n - TEXT_MAX / 2);
     begin.chain(" … ".chars()).chain(end).collect::<String>().into()
+}
+
+/// A path as a word of a shell's command, in quotes where it needs them.
+pub fn quoted(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:@%,".contains(c);
+    match !text.is_empty() && text.chars().all(is_plain) {
+        true => text.into_owned(),
+        false => single_quoted(&text),
+    }
+}
+
+/// Text in quotes, as one word of a shell's command.
+pub fn single_quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\'', r"'\''"))
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The program as its users see it: processes, files, exit codes.
 
+mod cells;
 mod check;
 mod crash;
 mod damage;

@@ -3,7 +3,9 @@
 /// A number with at most four significant digits; very large and very small ones with a power of ten.
 pub fn short(x: f64) -> String {
     let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
-    if rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
+    if rounded == 0.0 {
+        "0".to_owned()
+    } else if (1e-4..1e7).contains(&rounded.abs()) {
         format!("{rounded}")
     } else {
         format!("{rounded:e}")

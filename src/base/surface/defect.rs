@@ -2,6 +2,7 @@
 
 use super::contact::ContactKind;
 use super::embedded_set::EmbedError;
+use super::triangles::SourceFile;
 use crate::geom::Point;
 use tetdb_schema::code::Code;
 
@@ -48,6 +49,12 @@ pub enum SurfaceError {
         /// Number of vertices.
         n_vertices: usize,
     },
+    /// A face of a mesh of volume cells belongs to more than two of them.
+    #[error("cells {}, {} and {} share a face", cells[0], cells[1], cells[2])]
+    SharedFace {
+        /// Three of them.
+        cells: [u32; 3],
+    },
     /// The surface is too small to compute with exactly.
     #[error(
         "the surface is too small to compute with exactly: its longest extent is {extent:e}, expected above 1e-24"
@@ -57,12 +64,14 @@ pub enum SurfaceError {
         extent: f64,
     },
     /// Validation found defects; the error has the first of the worst kind.
-    #[error("{defect}")]
+    #[error("{}", defect.in_words(files))]
     Invalid {
         /// The first defect of the worst kind.
         defect: Box<Defect>,
         /// Defects in all.
         n_defects: u64,
+        /// The files of the surface.
+        files: Vec<SourceFile>,
     },
     /// An embedded edge or point cannot be there.
     #[error(transparent)]
@@ -93,6 +102,7 @@ impl SurfaceError {
             Self::TooLarge { .. } => Code::SurfaceTooLarge,
             Self::Memory { .. } | Self::EmbedMemory { .. } => Code::Memory,
             Self::NoSuchVertex { .. } => Code::IndexOutOfRange,
+            Self::SharedFace { .. } => Code::UnsupportedContent,
             Self::TooSmall { .. } => Code::CoordinateRange,
             Self::Invalid { defect, .. } => defect.code(),
             Self::Embed(wire) => wire.code(),
@@ -106,6 +116,7 @@ impl SurfaceError {
             Self::Memory { .. } => "allow more memory, or take a coarser surface",
             Self::EmbedMemory { .. } => "allow more memory, or take fewer edges and points",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
+            Self::SharedFace { .. } => "remove cells that are there twice or overlap others",
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),
             Self::Embed(wire) => wire.help(),
@@ -164,6 +175,15 @@ pub enum Defect {
     },
 }
 
+/// The number of a triangle; of several files, its number in its own and the name of that.
+pub fn triangle_name(files: &[SourceFile], t: u32) -> String {
+    let next = files.partition_point(|file| file.triangle_first <= t);
+    match files.get(next.wrapping_sub(1)) {
+        Some(file) if files.len() > 1 => format!("{} of {}", t - file.triangle_first, file.name),
+        _ => t.to_string(),
+    }
+}
+
 /// A position for messages; very large and very small numbers have a power of ten.
 pub fn show(p: Point) -> String {
     let [x, y, z] = p.to_array().map(show_number);
@@ -214,9 +234,31 @@ impl Defect {
         }
     }
 
-    /// Ids and coordinates on one line.
-    pub fn place(&self) -> String {
-        let ids: Vec<String> = self.triangles().iter().map(u32::to_string).collect();
+    /// The defect in words, its triangles by their numbers in `files`.
+    pub fn in_words(&self, files: &[SourceFile]) -> String {
+        let plain = self.to_string();
+        let [first, rest @ ..] = self.triangles() else { return plain };
+        let name = |t: u32| triangle_name(files, t);
+        match self {
+            _ if files.len() < 2 => plain,
+            Self::SelfIntersection { kind, .. } => {
+                let [a, b] = [name(*first), name(rest[0])];
+                format!("triangle {a} and triangle {b} meet where they should not: {kind}")
+            }
+            Self::Duplicate { .. } => {
+                format!("triangle {} repeats triangle {}", name(rest[0]), name(*first))
+            }
+            _ => plain.replacen(
+                &format!("triangle {first}"),
+                &format!("triangle {}", name(*first)),
+                1,
+            ),
+        }
+    }
+
+    /// Ids and coordinates on one line, ids by their numbers in `files`.
+    pub fn place(&self, files: &[SourceFile]) -> String {
+        let ids: Vec<String> = self.triangles().iter().map(|&t| triangle_name(files, t)).collect();
         match (self.at(), ids.len()) {
             (None, _) => "nowhere: there is nothing to show".to_owned(),
             (Some(p), 1) => format!("triangle {} near {}", ids[0], show(p)),

@@ -1,6 +1,7 @@
 //! The input: a closed surface of triangles with labels, welded and validated exactly.
 //!
-//! Reading order: [`triangles`](Surface) (the surface), `weld` (building one), `edges` (triangles at each edge),
+//! Reading order: [`triangles`](Surface) (the surface), `weld` (building one), `cells` (one
+//! from volume cells), `edges` (triangles at each edge),
 //! `orientation` (turning triangles alike), `contact` (how two triangles touch), `boxes`, `box_pairs` and `stars`
 //! (pairs that may touch), `validate` (all checks), `defect` (errors and suggestions), `boundary_loops` (open edges),
 //! `weld_near` and `repair` (repair on demand), `fitness` (mesh quality that the triangles allow), `split` (finer
@@ -14,6 +15,7 @@
 mod boundary_loops;
 mod box_pairs;
 mod boxes;
+mod cells;
 mod contact;
 mod defect;
 mod divide;
@@ -43,9 +45,10 @@ mod tests;
 
 pub use boundary_loops::{BoundaryLoop, TJunction, boundary_loops, t_junctions};
 pub use boxes::BoxTree;
+pub use cells::CellBoundary;
 pub use contact::{Contact, ContactKind, contact};
-pub use defect::show;
 pub use defect::{Defect, SurfaceError};
+pub use defect::{show, triangle_name};
 pub use edges::{Closedness, closedness};
 pub use embedded_set::{EmbedError, Embedded, EmbeddedSet};
 pub use fitness::{Fitness, fitness};

@@ -104,7 +104,7 @@ impl Surface {
 /// An action or omission of a reader that the user should see; not an error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
-    /// The file it is about.
+    /// The file it is about; empty for what is said of no file.
     pub file: String,
     /// The action or omission.
     pub kind: NoteKind,
@@ -147,6 +147,13 @@ pub enum NoteKind {
         /// Number of points.
         n: u64,
     },
+    /// The surface is the boundary of a mesh of volume cells.
+    BoundaryOfCells {
+        /// Number of cells.
+        n: u64,
+    },
+    /// What a caller that gives arrays says of them.
+    Said(String),
     /// A planar facet of several polygons or with holes was taken polygon by polygon.
     SplitFacets {
         /// Number of facets.
@@ -165,7 +172,9 @@ pub enum VolumePoints {
 
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.file)?;
+        if !self.file.is_empty() {
+            write!(f, "{}: ", self.file)?;
+        }
         match &self.kind {
             NoteKind::MissingEndsolid { line } => {
                 write!(f, "the text ends at line {line} without `endsolid`; all facets were read")
@@ -195,6 +204,11 @@ impl fmt::Display for Note {
                 };
                 write!(f, "{what} ({n}) {use_of}")
             }
+            NoteKind::BoundaryOfCells { n } => write!(
+                f,
+                "the boundary of {n} volume cells, and faces between their regions, are the surface"
+            ),
+            NoteKind::Said(text) => f.write_str(text),
             NoteKind::SplitFacets { n } => write!(
                 f,
                 "{n} facets have several polygons or holes; each polygon was taken for itself"

@@ -6,7 +6,7 @@ use super::contact::ContactKind;
 use super::contact::contact;
 use super::edges::{Closedness, Facets};
 use super::stars::touching;
-use super::{Defect, Surface, SurfaceError};
+use super::{Defect, SourceFile, Surface, SurfaceError};
 use crate::storage::ScratchSpace;
 
 /// Self-intersections listed at most; all are counted.
@@ -25,6 +25,8 @@ pub struct Validation {
     pub n_intersections: u64,
     /// Defects in all, listed or not.
     pub n_defects: u64,
+    /// The files of the surface.
+    pub files: Vec<SourceFile>,
 }
 
 impl Validation {
@@ -43,6 +45,7 @@ impl Validation {
             Some(defect) => Err(SurfaceError::Invalid {
                 defect: Box::new(defect.clone()),
                 n_defects: self.n_defects,
+                files: self.files.clone(),
             }),
         }
     }
@@ -93,7 +96,8 @@ pub fn validate_with(surface: &Surface, scratch: &ScratchSpace) -> Validation {
         kind: found.kind,
         at: found.at,
     }));
-    Validation { closedness, t_junctions, defects, n_intersections, n_defects }
+    let files = surface.files.clone();
+    Validation { closedness, t_junctions, defects, n_intersections, n_defects, files }
 }
 
 /// The defects that edges and vertices alone show.

@@ -18,6 +18,8 @@ pub struct SurfaceBuilder {
     label_ids: HashMap<String, u32>,
     file: String,
     triangle_first: usize,
+    /// Vertices, notes and seeds before this file.
+    before: [usize; 3],
     /// Vertex of the file -> welded vertex.
     file2vert: Vec<u32>,
     /// Vertices of this file that repeated an earlier position.
@@ -63,11 +65,28 @@ impl SurfaceBuilder {
     pub fn begin_file(&mut self, name: &str) {
         self.file = name.to_owned();
         self.triangle_first = self.surface.triangles.len();
+        let surface = &self.surface;
+        self.before = [surface.points.len(), surface.notes.len(), surface.seeds.len()];
         self.file2vert.clear();
         (self.n_welded, self.n_fanned, self.by_position) = (0, 0, false);
         self.surface
             .files
             .push(SourceFile { name: name.to_owned(), triangle_first: self.triangle_first as u32 });
+    }
+
+    /// Forgets all that the current file has given, to read it again.
+    pub fn restart_file(&mut self) {
+        let [n_points, n_notes, n_seeds] = self.before;
+        let surface = &mut self.surface;
+        surface.points.truncate(n_points);
+        surface.notes.truncate(n_notes);
+        surface.seeds.truncate(n_seeds);
+        surface.triangles.truncate(self.triangle_first);
+        surface.labels.truncate(self.triangle_first);
+        surface.files.pop();
+        self.table = PointTable::new(&surface.points);
+        let name = std::mem::take(&mut self.file);
+        self.begin_file(&name);
     }
 
     /// Number of vertices the current file has given so far.
@@ -157,6 +176,11 @@ impl SurfaceBuilder {
     /// Adds a seed of the volume around a point.
     pub fn seed(&mut self, seed: Seed) {
         self.surface.seeds.push(seed);
+    }
+
+    /// The vertex of the surface that vertex `v` of the current file is, where the file has it.
+    pub(super) fn vert(&self, v: u32) -> Option<u32> {
+        self.file2vert.get(v as usize).copied()
     }
 
     /// The middle of four vertices of the current file, where it has them.

@@ -11,7 +11,8 @@ use super::{ShapeArgs, SheetArgs};
     tetdb mesh sample:balls,count=100 -o balls.tetdb"
 )]
 pub struct MeshArgs {
-    /// Surface files (STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen), or a sample such as sample:balls,count=100
+    /// Surface files (STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen), boundary-of:FILE for that of volume cells, or a sample such as
+    /// sample:balls,count=100
     #[arg(required = true, value_name = "SURFACE")]
     pub surfaces: Vec<String>,
     /// The store to write [default: the surface's name with .tetdb, in the current folder]

@@ -37,12 +37,12 @@ impl From<SurfaceError> for Error {
     fn from(e: SurfaceError) -> Self {
         let error = Self::new(e.code(), &e).with_help(e.help()).with_remedy(Remedy::General);
         match &e {
-            SurfaceError::Invalid { defect, n_defects } => {
+            SurfaceError::Invalid { defect, n_defects, files } => {
                 let more = match n_defects.saturating_sub(1) {
                     0 => String::new(),
                     n => format!(" (and {n} more defects)"),
                 };
-                error.at(defect.place() + &more)
+                error.at(defect.place(files) + &more)
             }
             SurfaceError::Embed(wire) => error.at(show(wire.at())),
             _ => error,

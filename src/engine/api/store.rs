@@ -64,6 +64,9 @@ pub struct Summary {
     pub is_verified: bool,
     /// The greatest q = √6/12 · longest edge / inradius; 1 is regular.
     pub worst_quality: f64,
+    /// Number of triangles of the input, where the store says. Facets with this number and above hold embedded edges and are not of the
+    /// input.
+    pub input_triangles: Option<u64>,
     /// Names of the labels. A label is a position in this list.
     pub labels: Vec<String>,
     /// Regions by number, including empty ones.
@@ -227,6 +230,7 @@ impl Summary {
             interface_digest: interface_digest.to_string(),
             is_verified: catalog.state()? == StoreState::Verified,
             worst_quality: worst.fold(0.0, f64::max),
+            input_triangles: catalog.n_input_triangles()?,
             labels: catalog.labels()?,
             regions: catalog.regions()?,
             region_names: catalog.region_names()?,

@@ -43,7 +43,11 @@ impl Shapes {
         self.spoiled as f64 / self.triangles.max(1) as f64
     }
 
+    /// Returns whether the worst triangle allows better, and that or the number of bad ones by enough.
     fn is_gain_on(&self, before: &Self) -> bool {
+        if self.least >= before.least {
+            return false;
+        }
         let part = if self.share() <= before.share() {
             (self.share() / before.share()).min(self.least / before.least)
         } else {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
 
 use tetdb_schema::catalog::SurfaceSource;
-use tetdb_schema::source::{NamedFile, Origin, Source};
+use tetdb_schema::source::{BOUNDARY_OF, NamedFile, Origin, Source};
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::{Error, Remedy};
@@ -13,7 +13,7 @@ use super::{DefectPlace, Length, Settings, guarded};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface::{self, SplitReport, SurfaceBuilder, orient_alike_with, split};
-use tetdb_io::read::{WireKind, is_stream, read_surface};
+use tetdb_io::read::{WireKind, boundary_of, is_stream, read_surface_in};
 use tetdb_io::write::{self, SurfaceWritten};
 use tetdb_kernel::samples::{PREFIX, SampleSpec};
 use tetdb_kernel::sizing::{ExtraSizes, SizeField, SizeOptions};
@@ -63,9 +63,16 @@ impl CheckReport {
         self.n_defects == 0
     }
 
+    fn error_of(defect: &surface::Defect, validation: &surface::Validation) -> Error {
+        let files = &validation.files;
+        Error::new(defect.code(), defect.in_words(files))
+            .at(defect.place(files))
+            .with_help(defect.help())
+    }
+
     fn of(validation: &surface::Validation, fitness: &surface::Fitness) -> Self {
         let defects = validation.defects.iter();
-        let defects = defects.map(|d| Error::new(d.code(), d).at(d.place()).with_help(d.help()));
+        let defects = defects.map(|d| Self::error_of(d, validation));
         Self {
             defects: defects.collect(),
             places: DefectPlace::all_of(validation),
@@ -116,9 +123,30 @@ impl Surface {
     pub fn read<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> Result<Self, Error> {
         let paths: Vec<PathBuf> = files.into_iter().map(|p| p.as_ref().to_owned()).collect();
         guarded(&Settings::new(), || {
-            let cap = Settings::new().cap()?;
-            Self::read_in(&paths, cap)?.oriented(&ScratchSpace::boundless())
+            let scratch = Settings::new().scratch_space(0)?;
+            Self::read_in(&paths, &scratch)?.oriented(&ScratchSpace::boundless())
         })
+    }
+
+    /// The boundary of the volume cells of a mesh file (`.msh`, `.mesh`, `.meshb`, `.ele`), and faces between its regions.
+    ///
+    /// A triangle has the name of its region as label, one between two regions both names; each volume has a seed. Surface cells are
+    /// left out. [`Surface::read`] does the same for a file with volume cells alone.
+    ///
+    /// Errors: as [`Surface::read`]; `unsupported-content` if three cells share a face.
+    pub fn boundary_of(file: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = file.as_ref();
+        if is_stream(path) {
+            return Err(Error::new(
+                Code::UnsupportedContent,
+                "a stream cannot be read for its boundary",
+            )
+            .at(path.display())
+            .with_help("write it to a file first"));
+        }
+        let mut word = std::ffi::OsString::from(BOUNDARY_OF);
+        word.push(path);
+        Self::read([word])
     }
 
     /// A surface from arrays.
@@ -138,7 +166,14 @@ impl Surface {
                 .with_help("give one label for each triangle"));
         }
         guarded(&Settings::new(), || {
-            Self::built(points, triangles, labels)?.oriented(&ScratchSpace::boundless())
+            let add = |builder: &mut SurfaceBuilder| {
+                for (i, triangle) in triangles.iter().enumerate() {
+                    let label = builder.label(labels.map_or("surface", |labels| labels[i]));
+                    builder.triangle(*triangle, label)?;
+                }
+                Ok(())
+            };
+            Self::built(points, add)?.oriented(&ScratchSpace::boundless())
         })
     }
 
@@ -296,12 +331,12 @@ impl Surface {
         })
     }
 
-    /// Reads files, or generates one sample, within `cap` bytes of memory.
-    pub(super) fn load_within(words: &[String], cap: u64) -> Result<Self, Error> {
+    /// Reads files, or generates one sample, within the memory of `scratch`.
+    pub(super) fn load_within(words: &[String], scratch: &ScratchSpace) -> Result<Self, Error> {
         let samples = words.iter().filter(|word| word.starts_with(PREFIX)).count();
         match (samples, words) {
-            (1, [word]) => Self::generated(word, cap),
-            (0, _) => Self::read_in(&words.iter().map(PathBuf::from).collect::<Vec<_>>(), cap),
+            (1, [word]) => Self::generated(word, scratch.cap()),
+            (0, _) => Self::read_in(&words.iter().map(PathBuf::from).collect::<Vec<_>>(), scratch),
             _ => Err(Error::new(Code::Usage, "a sample cannot be joined with other surfaces")
                 .with_help("write it to a file first")
                 .with_remedy(Remedy::General)),
@@ -316,8 +351,8 @@ impl Surface {
         Ok(self)
     }
 
-    /// Notes on how the surface was read.
-    pub(super) fn notes(&self) -> Vec<String> {
+    /// Notes on how the surface was read: what was left out, cut, joined or turned.
+    pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.inner.notes.iter().map(ToString::to_string).collect();
         if self.turned > 0 {
             notes
@@ -344,7 +379,6 @@ impl Surface {
         store: &Path,
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
-        let cap = scratch.cap();
         let sources: Option<Vec<Source>> = sources.iter().map(Source::from_record).collect();
         let sources = sources.ok_or_else(|| {
             Error::new(Code::Damaged, "the record of the surface cannot be read")
@@ -354,12 +388,13 @@ impl Surface {
         let (own, inside) = sources.split_at(n);
         let mut surface = match own {
             [Source { origin: Origin::Copy, .. }] => {
-                let mut surface = Self::read_in(&[in_store(store)], cap)?;
+                let mut surface = Self::read_in(&[in_store(store)], scratch)?;
                 surface.sources = vec![given(&surface.inner)];
                 surface
             }
             _ => {
-                Self::load_within(&own.iter().map(|s| s.to_record().path).collect::<Vec<_>>(), cap)?
+                let words: Vec<String> = own.iter().map(|s| s.to_record().path).collect();
+                Self::load_within(&words, scratch)?
             }
         };
         // The triangles of a copy with sheets were oriented before the sheets were embedded.
@@ -400,8 +435,8 @@ impl Surface {
                 Ok(self)
             }
             Origin::Sheet(NamedFile { name, file }) => {
-                let sheet = Self::load_within(std::slice::from_ref(file), scratch.cap())?
-                    .oriented(scratch)?;
+                let sheet =
+                    Self::load_within(std::slice::from_ref(file), scratch)?.oriented(scratch)?;
                 self.embedded(sheet, Some(name))
             }
             Origin::EmbeddedCopy(counts) => self.with_kept_wires(*counts, store, scratch),
@@ -435,10 +470,10 @@ impl Surface {
         Ok(Self::of(inner, vec![source]))
     }
 
-    fn read_in(paths: &[PathBuf], cap: u64) -> Result<Self, Error> {
+    fn read_in(paths: &[PathBuf], scratch: &ScratchSpace) -> Result<Self, Error> {
         // A stream can be read only once and is gone in a later run, so the store keeps a copy.
         let is_stream = paths.iter().any(|path| is_stream(path));
-        let inner = read_surface(paths, cap)?;
+        let inner = read_surface_in(paths, scratch)?;
         let sources = match is_stream {
             true => vec![given(&inner)],
             false => paths.iter().map(|p| source(p)).collect::<Result<_, _>>()?,
@@ -446,10 +481,10 @@ impl Surface {
         Ok(Self::of(inner, sources))
     }
 
-    fn built(
+    /// A surface from arrays: its vertices are `points`, the rest is what `add` adds.
+    pub(super) fn built(
         points: &[[f64; 3]],
-        triangles: &[[u32; 3]],
-        labels: Option<&[&str]>,
+        add: impl FnOnce(&mut SurfaceBuilder) -> Result<(), Error>,
     ) -> Result<Self, Error> {
         let mut builder = SurfaceBuilder::new();
         builder.begin_file("arrays");
@@ -460,11 +495,7 @@ impl Surface {
             }
             builder.vertex(Point::from_array(*point))?;
         }
-        for (i, triangle) in triangles.iter().enumerate() {
-            let name = labels.map_or("surface", |labels| labels[i]);
-            let label = builder.label(name);
-            builder.triangle(*triangle, label)?;
-        }
+        add(&mut builder)?;
         builder.end_file()?;
         let inner = builder.finish();
         Ok(Self::given(inner))
@@ -493,6 +524,11 @@ pub fn in_store(store: &Path) -> PathBuf {
 /// Identity of a file: absolute path, length and hash.
 #[doc(hidden)]
 pub fn source(path: &Path) -> Result<Source, Error> {
+    if let Some(inner) = boundary_of(path) {
+        let of = source(&inner)?;
+        let file = of.origin.file().unwrap_or_default();
+        return Ok(Source { origin: Origin::File(format!("{BOUNDARY_OF}{file}")), ..of });
+    }
     let io = |e: std::io::Error| {
         let message = match e.kind() {
             std::io::ErrorKind::NotFound => "there is no such file".to_owned(),

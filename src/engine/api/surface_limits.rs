@@ -19,7 +19,7 @@ impl Surface {
     /// As [`Surface::read`] and [`Surface::sample`].
     pub fn load(words: &[String], settings: &Settings) -> Result<Self, Error> {
         guarded(settings, || {
-            let surface = Self::load_within(words, settings.cap()?)?;
+            let surface = Self::load_within(words, &settings.scratch_space(0)?)?;
             let scratch = settings.scratch_space(surface.inner.bytes() as u64)?;
             let surface = surface.oriented(&scratch)?;
             surface.notes().iter().for_each(|note| settings.note(format!("note: {note}")));

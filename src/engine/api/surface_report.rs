@@ -13,7 +13,7 @@ use tetdb_base::shape::face_least;
 use tetdb_base::storage::attempt;
 use tetdb_base::surface::{
     self, BoundaryLoop, Closing, Defect, Fitness, Validation, boundary_loops, closing, fitness,
-    repair_bytes, validate_with,
+    repair_bytes, triangle_name, validate_with,
 };
 use tetdb_io::write;
 
@@ -155,6 +155,13 @@ impl<'a> SurfaceReport<'a> {
                 f.forcing_triangles
             ));
         }
+        if let Some((n, step)) = self.rounded_crossings() {
+            advice.push(format!(
+                "all coordinates are 32-bit numbers, up to {} apart here, and {n} of the listed triangles that meet do so by no more than \
+                 that; write the surface with 64-bit coordinates, or as text with all digits",
+                short(step)
+            ));
+        }
         if f.edge_min > 0.0 && f.edge_max / f.edge_min > POOR_RATIO {
             advice.push(format!(
                 "the shortest edge is {} of the longest; if such edges are no intended detail, remove them in the program the surface comes from",
@@ -162,6 +169,45 @@ impl<'a> SurfaceReport<'a> {
             ));
         }
         advice
+    }
+
+    /// The number of a triangle; of several files, its number in its own and the name of that.
+    pub fn triangle_name(&self, t: u32) -> String {
+        triangle_name(&self.surface.files, t)
+    }
+
+    /// A defect in words.
+    pub fn defect_in_words(&self, defect: &Defect) -> String {
+        defect.in_words(&self.surface.files)
+    }
+
+    /// Number of listed crossings that the steps of 32-bit coordinates explain, and the largest step. `None` where there are none, or
+    /// where a coordinate has more digits.
+    ///
+    /// A crossing is explained if a corner of one triangle is off the plane of the other, by two steps at most.
+    fn rounded_crossings(&self) -> Option<(usize, f64)> {
+        let mut most = 0f64;
+        for x in self.surface.points.iter().flat_map(|p| p.to_array()) {
+            if f64::from(x as f32) != x {
+                return None;
+            }
+            most = most.max(x.abs());
+        }
+        let step = f64::from((most as f32).next_up()) - most;
+        let is_near = |a: u32, b: u32| {
+            let [p, q, r] = self.surface.corners(a);
+            let normal = (q - p).cross(r - p).normalize_or_zero();
+            let off = self.surface.corners(b).map(|corner| normal.dot(corner - p).abs());
+            off.into_iter().any(|distance| distance > 0.0 && distance <= 2.0 * step)
+        };
+        let is_explained = |defect: &&Defect| match defect {
+            Defect::SelfIntersection { triangles: [a, b], .. } => {
+                is_near(*a, *b) || is_near(*b, *a)
+            }
+            _ => false,
+        };
+        let n = self.validation.defects.iter().filter(is_explained).count();
+        (n > 0).then_some((n, step))
     }
 
     fn json(&self) -> Value {
@@ -197,7 +243,7 @@ impl<'a> SurfaceReport<'a> {
             "edges": edges.n_edges, "parts": edges.n_components, "open_edges": edges.open.len(),
             "nonmanifold_edges": edges.n_nonmanifold, "two_sided_triangles": edges.two_sided.len(),
             "valid": self.is_valid(), "n_defects": found.n_defects,
-            "defects": found.defects.iter().map(defect_json).collect::<Vec<_>>(),
+            "defects": found.defects.iter().map(|defect| defect_json(defect, surface)).collect::<Vec<_>>(),
             "open_loops": open_loops, "t_junctions": junctions,
             "closing": { "tried": self.closing, "smallest": self.closes().map(|c| c.share) },
             "fitness": fitness, "advice": self.advice(), "cures": self.suggestions,
@@ -220,11 +266,16 @@ fn expected(surface: &surface::Surface, settings: &Settings, cap: u64) -> Option
     predict(surface, &MeshOptions::default().into(), cap, &beside).ok()
 }
 
-fn defect_json(defect: &Defect) -> Value {
+fn defect_json(defect: &Defect, surface: &surface::Surface) -> Value {
     let mut value = json!({
         "code": defect.code(), "triangles": defect.triangles(), "at": defect.at().map(|p| p.to_array()),
-        "message": defect.to_string(), "help": defect.help(),
+        "message": defect.in_words(&surface.files), "help": defect.help(),
     });
+    if surface.files.len() > 1 {
+        let sources = defect.triangles().iter().filter_map(|&t| surface.source(t));
+        let sources = sources.map(|(file, triangle)| json!({ "file": file, "triangle": triangle }));
+        value["sources"] = sources.collect();
+    }
     if let Defect::SelfIntersection { kind, .. } = defect {
         value["kind"] = json!(kind.word());
     }

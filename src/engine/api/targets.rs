@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
 
 use super::Error;
+use tetdb_io::read::boundary_of;
 use tetdb_schema::source::Source;
 use tetdb_store::store::Catalog;
 
@@ -32,7 +33,8 @@ pub fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
         return refused(format!("{} is {what}, no file to be written", out.display()));
     }
     let written = with_others(out, &WRITTEN);
-    let read = inputs.iter().flat_map(|input| with_others(input, &READ));
+    let files = inputs.iter().map(|input| boundary_of(input).unwrap_or_else(|| input.clone()));
+    let read = files.flat_map(|input| with_others(&input, &READ));
     for input in read {
         if let Some(out) = written.iter().find(|out| is_same_file(&input, out)) {
             return refused(format!(

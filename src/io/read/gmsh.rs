@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::BufRead;
 
+use super::cells::gmsh_corners;
 use super::feed::{Feed, name};
 use super::gmsh_numbers::{GmshNumbers, NodeTags, Role, need_element_type};
 use super::{ReadFault, Result, SurfaceSink};
@@ -87,6 +88,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         let first = std::mem::take(&mut mesh.first_tets);
         mesh.target.regions_of_mesh(&first);
     }
+    mesh.target.leave_out_cells(mesh.n_solids);
+    mesh.target.end_cells(&mesh.numbers.feed)?;
     mesh.numbers.feed.finish(mesh.target.builder)
 }
 
@@ -163,7 +166,10 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     }
 
     /// Keeps the first tetrahedron of each volume in a physical group.
-    fn solid(&mut self, kind: i64, tags: &[i64; 4], group: i64, volume: i64) -> Result<()> {
+    fn solid(&mut self, kind: i64, tags: &[i64; 8], group: i64, volume: i64) -> Result<()> {
+        if self.target.cells.are_wanted() {
+            return self.cell(kind, tags, group);
+        }
         self.n_solids += 1;
         let is_tet = kind == 4 || kind == 11;
         if group == 0 || !is_tet || !self.seen.insert((group, volume)) {
@@ -177,6 +183,22 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         let name = known.unwrap_or_else(|| format!("volume_{group}"));
         self.first_tets.entry(name).or_default().push(corners);
         Ok(())
+    }
+
+    /// Adds a solid element whose boundary is the surface.
+    fn cell(&mut self, kind: i64, tags: &[i64; 8], group: i64) -> Result<()> {
+        let n = gmsh_corners(kind, &self.numbers.feed)?;
+        let mut corners = [0; 8];
+        for (corner, tag) in corners.iter_mut().zip(&tags[..n]) {
+            *corner = self.nodes.find(*tag, &self.numbers.feed)?;
+        }
+        let known = self.volume_names.get(&group).cloned();
+        let name = known.unwrap_or_else(|| match group {
+            0 => String::new(),
+            _ => format!("volume_{group}"),
+        });
+        let (n_nodes, _) = need_element_type(kind, &self.numbers.feed)?;
+        self.target.cell(&self.numbers.feed, (&corners[..n], n_nodes), &name)
     }
 
     fn node(&mut self, tag: i64, p: Point) -> Result<()> {
@@ -193,6 +215,9 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     }
 
     fn face(&mut self, tags: &[i64], group: i64) -> Result<()> {
+        if self.target.leaves_out_face() {
+            return Ok(());
+        }
         let mut corners = [0; 4];
         for (corner, tag) in corners.iter_mut().zip(tags) {
             *corner = self.nodes.find(*tag, &self.numbers.feed)?;
@@ -272,7 +297,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             }
         }
         let (n_nodes, role) = need_element_type(kind, &self.numbers.feed)?;
-        let mut tags = [0; 4];
+        let mut tags = [0; 8];
         for i in 0..n_nodes {
             let tag = self.numbers.int()?;
             if let Some(slot) = tags.get_mut(i) {
@@ -406,7 +431,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             for k in 0..n {
                 self.numbers.need_record("elements", n, k)?;
                 self.numbers.size()?;
-                let mut tags = [0; 4];
+                let mut tags = [0; 8];
                 for j in 0..n_nodes {
                     let tag = self.numbers.size()?;
                     if let Some(slot) = tags.get_mut(j) {

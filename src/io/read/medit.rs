@@ -30,13 +30,20 @@ pub(super) fn read<R: BufRead>(
             "vertices" => n_vertices += read_vertices(numbers, target)?,
             "triangles" => read_faces::<3, _>(numbers, "triangles", n_vertices, target)?,
             "quadrilaterals" => read_faces::<4, _>(numbers, "quadrilaterals", n_vertices, target)?,
+            "tetrahedra" if target.cells.are_wanted() => {
+                read_cells::<4, _>(numbers, n_vertices, target)?;
+            }
             "tetrahedra" => read_tets(numbers, n_vertices, target)?,
             "trianglesp2" | "quadrilateralsq2" => {
                 return Err(numbers.feed.unsupported("curved triangles"));
             }
             _ => {
+                if target.cells.are_wanted() && cells_of(numbers, keyword, n_vertices, target)? {
+                    return Ok(SectionRead::Whole);
+                }
                 if let Some(what) = solid(keyword) {
                     let n = numbers.skipped_count()?;
+                    target.leave_out_cells(n);
                     note_skipped(what, n, target);
                 }
                 return Ok(SectionRead::Part);
@@ -44,6 +51,7 @@ pub(super) fn read<R: BufRead>(
         }
         Ok(SectionRead::Whole)
     })?;
+    target.end_cells(&numbers.feed)?;
     numbers.feed.finish(target.builder)
 }
 
@@ -91,12 +99,53 @@ fn read_faces<const N: usize, R: BufRead>(
         numbers.feed.need_record(what, n, i)?;
         let corners = numbers.corners::<N>(n_vertices)?;
         let reference = numbers.integer("a reference")?;
+        if target.leaves_out_face() {
+            continue;
+        }
         let label = match last {
             Some((known, label)) if known == reference => label,
             _ => target.label(&reference.to_string()),
         };
         last = Some((reference, label));
         numbers.feed.placed(target.builder.polygon(&corners, label))?;
+    }
+    Ok(())
+}
+
+/// Reads solid elements other than tetrahedra; `false` for what are none.
+fn cells_of<R: BufRead>(
+    numbers: &mut MeditNumbers<R>,
+    keyword: &str,
+    n_vertices: u64,
+    target: &mut SurfaceSink,
+) -> Result<bool> {
+    match keyword {
+        "hexahedra" => read_cells::<8, _>(numbers, n_vertices, target)?,
+        "prisms" => read_cells::<6, _>(numbers, n_vertices, target)?,
+        "pyramids" => read_cells::<5, _>(numbers, n_vertices, target)?,
+        "tetrahedrap2" => {
+            return Err(numbers.feed.unsupported("the boundary of curved tetrahedra"));
+        }
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// Reads cells whose boundary is the surface.
+fn read_cells<const N: usize, R: BufRead>(
+    numbers: &mut MeditNumbers<R>,
+    n_vertices: u64,
+    target: &mut SurfaceSink,
+) -> Result<()> {
+    let n = numbers.count("cells", 0, N as u64 + 1)?;
+    for i in 0..n {
+        numbers.feed.need_record("cells", n, i)?;
+        let corners = numbers.corners::<N>(n_vertices)?;
+        let name = match numbers.integer("a reference")? {
+            0 => String::new(),
+            reference => format!("ref_{reference}"),
+        };
+        target.cell(&numbers.feed, (&corners, N), &name)?;
     }
     Ok(())
 }
@@ -117,6 +166,7 @@ fn read_tets<R: BufRead>(
             first.entry(format!("ref_{reference}")).or_insert_with(|| vec![corners]);
         }
     }
+    target.leave_out_cells(n);
     note_skipped("tetrahedra", n, target);
     if n > 0 {
         target.regions_of_mesh(&first);

@@ -4,6 +4,7 @@
 //! has its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
 //! become doubles exactly. Polygons are fanned, vertices with identical bits are one.
 
+mod cells;
 mod embedded;
 mod embedded_sink;
 mod error;
@@ -21,6 +22,7 @@ mod sink;
 mod sizes;
 mod stl;
 mod tetgen;
+mod volume_cells;
 mod vtk;
 
 #[cfg(test)]
@@ -31,6 +33,7 @@ mod tests;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
+pub use cells::boundary_of;
 pub use embedded::read_wires;
 pub use embedded_sink::WireKind;
 pub use error::{FilePlace, ReadError, ReadFault, Spot};
@@ -40,7 +43,9 @@ pub use open::is_stream;
 use open::{open, stem, unpacked_name};
 use sink::SurfaceSink;
 pub use sizes::{FileSizes, read_sizes, size_files};
+use volume_cells::VolumeCells;
 
+use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{Surface, SurfaceBuilder, SurfaceError};
 
 /// A kind of surface file.
@@ -64,6 +69,8 @@ pub enum Format {
     TetgenSmesh,
     /// TetGen `.poly`.
     TetgenPoly,
+    /// TetGen `.ele`, tetrahedra; their boundary is the surface.
+    TetgenEle,
 }
 
 impl Format {
@@ -81,8 +88,14 @@ impl Format {
             "msh" => Self::Gmsh,
             "smesh" => Self::TetgenSmesh,
             "poly" => Self::TetgenPoly,
+            "ele" => Self::TetgenEle,
             _ => return None,
         })
+    }
+
+    /// Returns whether files of this format can have volume cells.
+    fn has_cells(self) -> bool {
+        matches!(self, Self::Medit | Self::MeditBinary | Self::Gmsh | Self::TetgenEle)
     }
 
     /// The format of a file's first bytes, for names without a known extension.
@@ -139,14 +152,38 @@ const EXTENT_MIN: f64 = 1e-24;
 /// # Errors
 /// The first [`ReadError`], with its file and place; nothing is repaired beyond welding and fanning.
 pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
+    read_surface_in(paths, &ScratchSpace::new(cap, std::env::temp_dir()))
+}
+
+/// Like [`read_surface`], with the memory and the folder of `space`.
+///
+/// Behind `boundary-of:` a path names a mesh whose volume cells bound the surface. So it is of a file with volume cells alone.
+///
+/// # Errors
+/// As [`read_surface`]. Unwinds where the disk fails.
+pub fn read_surface_in(paths: &[PathBuf], space: &ScratchSpace) -> Result<Surface> {
+    let cap = space.cap();
     let mut builder = SurfaceBuilder::within(cap);
     let mut prefixes: Vec<String> = Vec::new();
     for path in paths {
+        let inner = boundary_of(path);
+        let (path, is_bounded) = (inner.as_deref().unwrap_or(path), inner.is_some());
         let stem = stem(path);
         let prefix = (paths.len() > 1).then(|| unique(&stem, &prefixes));
         prefixes.extend(prefix.clone());
-        let mut target = SurfaceSink { builder: &mut builder, stem, prefix };
-        read_file(path, cap / 4, &mut target)?;
+        let cells = match is_bounded {
+            true => VolumeCells::bounding(space),
+            false => VolumeCells::default(),
+        };
+        let mut target = SurfaceSink { builder: &mut builder, stem, prefix, cells };
+        let read = read_file(path, cap / 4, &mut target);
+        if read.is_err() && target.has_cells_alone() && !is_stream(path) {
+            target.builder.restart_file();
+            target.cells = VolumeCells::bounding(space);
+            read_file(path, cap / 4, &mut target)?;
+        } else {
+            read?;
+        }
     }
     let surface = builder.finish();
     let bounds = surface.bounds();
@@ -167,8 +204,8 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
 /// As [`read_surface`].
 pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> {
     let mut builder = SurfaceBuilder::new();
-    let mut target =
-        SurfaceSink { builder: &mut builder, stem: stem(Path::new(file)), prefix: None };
+    let (stem, cells) = (stem(Path::new(file)), VolumeCells::default());
+    let mut target = SurfaceSink { builder: &mut builder, stem, prefix: None, cells };
     target.builder.begin_file(file);
     let feed = Feed::new(file, bytes, bytes.len() as u64);
     read_feed(format, feed, None, 0, &mut target)?;
@@ -176,7 +213,7 @@ pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> 
 }
 
 const UNKNOWN_FORMAT: ReadFault = ReadFault::UnknownFormat(
-    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds, with .gz or .zst behind it where it is packed",
+    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh, .poly or .ele after what it holds, with .gz or .zst behind it where it is packed",
 );
 
 fn unique(stem: &str, taken: &[String]) -> String {
@@ -204,8 +241,12 @@ fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
             found.ok_or_else(|| place.refuse(kind.map_or(UNKNOWN_FORMAT, ReadFault::SolidModel)))?
         }
     };
+    if target.cells.are_wanted() && !format.has_cells() {
+        let what = "the boundary of volume cells in a file that has none by its format".to_owned();
+        return Err(place.refuse(ReadFault::Unsupported(what)));
+    }
     target.builder.begin_file(feed.file());
-    let nodes = matches!(format, Format::TetgenSmesh | Format::TetgenPoly)
+    let nodes = matches!(format, Format::TetgenSmesh | Format::TetgenPoly | Format::TetgenEle)
         .then(|| unpacked_name(path).with_extension("node"));
     read_feed(format, feed, nodes.as_deref(), limit, target)
 }
@@ -228,6 +269,7 @@ fn read_feed<R: BufRead>(
         Format::Medit => medit::read(feed, false, target),
         Format::MeditBinary => medit::read(feed, true, target),
         Format::Gmsh => gmsh::read(feed, target),
+        Format::TetgenEle => cells::read_ele(feed, nodes, limit, target),
         Format::TetgenSmesh => tetgen::read(feed, tetgen::FacetLayout::Smesh, nodes, limit, target),
         Format::TetgenPoly => tetgen::read(feed, tetgen::FacetLayout::Poly, nodes, limit, target),
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::volume_cells::VolumeCells;
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceBuilder, VolumePoints};
 
@@ -12,6 +13,8 @@ pub struct SurfaceSink<'a> {
     pub(super) stem: String,
     /// Put before each label when several files make one surface.
     pub(super) prefix: Option<String>,
+    /// Volume cells of the file.
+    pub(super) cells: VolumeCells,
 }
 
 impl SurfaceSink<'_> {

@@ -23,9 +23,9 @@ pub(super) enum FacetLayout {
 
 /// The numbering of points: the first one's number and how many.
 #[derive(Clone, Copy)]
-struct Numbering {
-    first: i64,
-    n: u64,
+pub(super) struct Numbering {
+    pub first: i64,
+    pub n: u64,
 }
 
 pub(super) fn read<R: BufRead>(
@@ -94,7 +94,7 @@ fn read_volume_points<R: BufRead>(
     Ok(())
 }
 
-fn read_node_file<R: BufRead>(
+pub(super) fn read_node_file<R: BufRead>(
     feed: &Feed<R>,
     nodes: Option<&Path>,
     limit: u64,

@@ -70,7 +70,9 @@ pub(super) fn write(
             | MeshFormat::Abaqus
             | MeshFormat::TetGen
     );
-    if !has_lines && selection.content == Content::Mesh {
+    // TetGen's files have edges and no points.
+    let lacks_points = format == MeshFormat::TetGen && !mesh.embedded().points.is_empty();
+    if (!has_lines || lacks_points) && selection.content == Content::Mesh {
         write_list(mesh, outputs, out)?;
     }
     mesh.report_end();

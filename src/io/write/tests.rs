@@ -82,7 +82,7 @@ impl Vtu {
                 let length = u64::from_le_bytes(bytes[at..at + 8].try_into()?) as usize;
                 let array = bytes[at + 8..at + 8 + length].to_vec();
                 arrays.insert(format!("{group}.{name}"), array);
-                end = at + 8 + length;
+                end = end.max(at + 8 + length);
             } else if !line.starts_with("</") {
                 group = line.trim_matches(['<', '>']).to_owned();
             }

@@ -167,7 +167,7 @@ impl Store {
             let s = store.summary();
             let words = json!({
                 "n_tets": s.n_tets, "n_vertices": s.n_vertices, "bytes": s.bytes,
-                "digest": s.digest, "is_verified": s.is_verified,
+                "digest": s.digest, "input_triangles": s.input_triangles, "is_verified": s.is_verified,
                 "worst_quality": s.worst_quality, "labels": s.labels, "regions": s.regions,
                 "subdomains": s.subdomains, "interfaces": s.interfaces,
             });

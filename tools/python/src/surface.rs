@@ -6,7 +6,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde_json::json;
-use tetdb::{CancelToken, DefectPlace};
+use tetdb::{CancelToken, CellArrays, DefectPlace, Seed, SeedKind};
 
 use crate::sizes::length;
 use crate::watched::watched;
@@ -34,6 +34,11 @@ impl Surface {
     }
 
     #[staticmethod]
+    fn boundary_of(py: Python<'_>, file: PathBuf) -> PyResult<Self> {
+        made(py, || tetdb::Surface::boundary_of(file))
+    }
+
+    #[staticmethod]
     fn sample(py: Python<'_>, spec: String) -> PyResult<Self> {
         made(py, || tetdb::Surface::sample(&spec))
     }
@@ -53,12 +58,57 @@ impl Surface {
             None => None,
         };
         made(py, move || {
-            let labels: Option<Vec<&str>> = labels.as_ref().map(|(names, codes)| {
-                let names = codes.iter().map(|&code| names[code as usize].as_str());
-                names.collect()
-            });
+            let labels = labels.as_ref().map(|(names, codes)| named(names, codes));
             tetdb::Surface::from_arrays(&points, &triangles, labels.as_deref())
         })
+    }
+
+    /// The same with polygons of `counts` corners, or of the boundary of volume cells; with notes on what the caller left out.
+    #[staticmethod]
+    fn of_cells(
+        py: Python<'_>,
+        points: PyReadonlyArray2<'_, f64>,
+        counts: PyReadonlyArray1<'_, u32>,
+        corners: PyReadonlyArray1<'_, u32>,
+        labels: Option<(Vec<String>, PyReadonlyArray1<'_, i64>)>,
+        is_volume: bool,
+        notes: Vec<String>,
+    ) -> PyResult<Self> {
+        let points: Vec<[f64; 3]> = bytemuck::cast_slice(points.as_slice()?).to_vec();
+        let (counts, corners) = (counts.as_slice()?.to_vec(), corners.as_slice()?.to_vec());
+        let labels = match labels {
+            Some((names, codes)) => Some((names, codes.as_slice()?.to_vec())),
+            None => None,
+        };
+        made(py, move || {
+            let labels = labels.as_ref().map(|(names, codes)| named(names, codes));
+            let cells = CellArrays { counts: &counts, corners: &corners, names: labels.as_deref() };
+            let surface = match is_volume {
+                true => tetdb::Surface::boundary_of_cells(&points, cells)?,
+                false => tetdb::Surface::from_polygons(&points, cells)?,
+            };
+            Ok(notes.into_iter().fold(surface, tetdb::Surface::noted))
+        })
+    }
+
+    /// What the arrays do not say: notes, and seeds as text, with whether each is a hole.
+    fn extras(&self) -> (Vec<String>, Vec<(String, bool)>) {
+        let seed = |seed: &Seed| (seed.to_string(), seed.kind == SeedKind::Hole);
+        (self.inner.notes(), self.inner.seeds().iter().map(seed).collect())
+    }
+
+    fn with_extras(&self, notes: Vec<String>, seeds: Vec<(String, bool)>) -> Self {
+        let seed = |(text, is_hole): (String, bool)| match is_hole {
+            true => Seed::parse_hole(&text),
+            false => Seed::parse_region(&text),
+        };
+        let seeds = seeds.into_iter().filter_map(seed).collect();
+        let surface = tetdb::Surface::clone(&self.inner).with_notes_and_seeds(notes, seeds);
+        Self { inner: Arc::new(surface) }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.inner.notes()
     }
 
     fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
@@ -184,8 +234,11 @@ impl Surface {
         })
     }
 
-    fn write(&self, py: Python<'_>, out: PathBuf) -> PyResult<()> {
-        let work = || Ok(self.inner.write(out).map(|_| ())?);
+    /// Returns what the file does not keep: labels, numbers of embedded edges and points, and of seeds.
+    fn write(&self, py: Python<'_>, out: PathBuf) -> PyResult<(bool, usize, usize)> {
+        let n_inside = self.inner.n_embedded().iter().sum();
+        let n_seeds = self.inner.seeds().len();
+        let work = || Ok((!self.inner.write(out)?.labels_kept, n_inside, n_seeds));
         watched(py, &CancelToken::new(), None, work)
     }
 }
@@ -212,6 +265,10 @@ pub enum EdgesGiven<'py> {
 pub enum PointsGiven<'py> {
     File(PathBuf),
     Arrays(PyReadonlyArray2<'py, f64>, Option<Vec<String>>),
+}
+
+fn named<'a>(names: &'a [String], codes: &[i64]) -> Vec<&'a str> {
+    codes.iter().map(|&code| names[code as usize].as_str()).collect()
 }
 
 fn words(all: &[String]) -> Vec<&str> {

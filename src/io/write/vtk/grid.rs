@@ -248,15 +248,15 @@ impl Layout {
     fn xml(arrays: &[Array], bytes_per: &[[u64; 3]], counts: Counts, texts: Texts) -> Self {
         let rows = [counts[0], counts[1], 1];
         let lengths: Vec<u64> = bytes_per.iter().map(|per| bytes_of(per, rows)).collect();
-        let head = xml_head(arrays, &lengths, counts, texts).into_bytes();
-        let mut at = head.len() as u64;
+        let (offsets, end) = xml_offsets(&lengths);
+        let head = xml_head(arrays, &offsets, counts, texts).into_bytes();
+        let first = head.len() as u64;
         let mut fixed = vec![(0, head)];
-        let mut starts = Vec::new();
-        for bytes in lengths {
-            fixed.push((at, bytes.to_le_bytes().to_vec()));
-            starts.push(at + 8);
-            at += 8 + bytes;
+        for (offset, bytes) in offsets.iter().zip(lengths) {
+            fixed.push((first + offset, bytes.to_le_bytes().to_vec()));
         }
+        let starts = offsets.iter().map(|offset| first + offset + 8).collect();
+        let at = first + end;
         fixed.push((at, TAIL.as_bytes().to_vec()));
         Self { fixed, starts, file_bytes: at + TAIL.len() as u64 }
     }
@@ -309,7 +309,22 @@ impl Layout {
     }
 }
 
-fn xml_head(arrays: &[Array], lengths: &[u64], counts: Counts, texts: Texts) -> String {
+/// Where each array begins behind the head, and where the last one ends.
+///
+/// The array named last comes first. meshio replaces these numbers from the first array on by others, and looks for the next array by
+/// its number from the top of the file: so it finds the array itself before one that it has renumbered alike.
+fn xml_offsets(lengths: &[u64]) -> (Vec<u64>, u64) {
+    let mut end = 0;
+    let mut offsets = vec![0; lengths.len()];
+    for (offset, bytes) in offsets.iter_mut().zip(lengths).rev() {
+        *offset = end;
+        end += 8 + bytes;
+    }
+    (offsets, end)
+}
+
+/// The text before the arrays. An array of one component does not say so: meshio would make a matrix of it.
+fn xml_head(arrays: &[Array], offsets: &[u64], counts: Counts, texts: Texts) -> String {
     let mut text = "<?xml version=\"1.0\"?>\n\
          <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n  \
          <UnstructuredGrid>\n"
@@ -325,17 +340,18 @@ fn xml_head(arrays: &[Array], lengths: &[u64], counts: Counts, texts: Texts) -> 
     }
     text +=
         &format!("    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n", counts[0], counts[1]);
-    let mut offset = 0;
     for group in [Group::PointData, Group::CellData, Group::Points, Group::Cells] {
         text += &format!("      <{group:?}>\n");
-        for (array, bytes) in arrays.iter().zip(lengths).filter(|(a, _)| a.group == group) {
+        for (array, offset) in arrays.iter().zip(offsets).filter(|(a, _)| a.group == group) {
+            let components = match array.components {
+                1 => String::new(),
+                n => format!(" NumberOfComponents=\"{n}\""),
+            };
             text += &format!(
-                "        <DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" offset=\"{offset}\"/>\n",
+                "        <DataArray type=\"{}\" Name=\"{}\"{components} format=\"appended\" offset=\"{offset}\"/>\n",
                 array.number.vtk(),
-                array.name,
-                array.components
+                array.name
             );
-            offset += 8 + bytes;
         }
         text += &format!("      </{group:?}>\n");
     }

@@ -156,6 +156,9 @@ def _create(
     replace = _options.one_of(existing, ("keep", "replace"), "existing") == "replace"
     listener = _options.listener(progress)
     where = _path(path)
+    if listener:
+        for note in given.notes:
+            listener("note", note, 0, None, "")
     _native.mesh(given._inner, where, job, settings, replace, bool(verify), coarse_only, listener)
     return where
 

@@ -158,6 +158,7 @@ class Subdomain:
         self.rank = rank
         self.info = store._info(rank)
         self._part = store._native.part(rank)
+        self._input_triangles: int | None = store._said()["input_triangles"]
 
     def __repr__(self) -> str:
         return f"<tetdb.Subdomain {self.rank}: {self.info.n_tets} tetrahedra>"
@@ -209,7 +210,11 @@ class Subdomain:
     @cached_property
     def facets(self) -> npt.NDArray[np.void]:
         """Structured, one row for each input triangle: `triangle`, `vertices` (3), `label`, `regions` (2), `tets` (2, -1: none)."""
-        return _locked(self._part.facets().view(_FACET).reshape(-1))
+        rows = self._part.facets().view(_FACET).reshape(-1)
+        if self._input_triangles is not None:
+            # Others hold embedded edges.
+            rows = rows[rows["triangle"] < self._input_triangles]
+        return _locked(rows)
 
 
 class Store:
@@ -346,13 +351,15 @@ class Store:
                 del chunk
 
     def merged(self, subdomains: int | Sequence[int] | None = None) -> Merged:
-        """Sub-domains joined to one mesh in memory, all of them by default."""
-        ranks = [r.rank for r in self.subdomains] if subdomains is None else _options.ranks(subdomains, "subdomains")
+        """Tetrahedra of sub-domains joined to one mesh in memory, of all by default; a sub-domain that is named twice counts once."""
+        ranks = [r.rank for r in self.subdomains] if subdomains is None else list(dict.fromkeys(_options.ranks(subdomains, "subdomains")))
         parts = [self.subdomain(rank) for rank in ranks]
         if not parts:
             raise TetdbError("no-such-part", "an empty list of sub-domains", "subdomains")
         ids = np.concatenate([part.vertex_ids for part in parts])
         vertex_ids, first, number = np.unique(ids, return_index=True, return_inverse=True)
+        if len(vertex_ids) >= 2**31:
+            raise TetdbError("usage", f"{len(vertex_ids)} vertices are too many for one mesh of int32", "subdomains", "join fewer sub-domains, or read chunks")
         points = np.concatenate([part.points for part in parts])[first]
         starts = np.cumsum([0] + [part.info.n_points for part in parts])
         number = number.reshape(-1).astype(np.int32)
@@ -362,7 +369,10 @@ class Store:
         return Merged(points, tets, regions, owners, vertex_ids)
 
     def to_pyvista(self, subdomain: int | Sequence[int] | None = None) -> Any:
-        """A PyVista ``UnstructuredGrid`` with cell data `region` and `subdomain`; needs the package pyvista."""
+        """A PyVista ``UnstructuredGrid`` of the tetrahedra, with cell data `region` and `subdomain`; needs the package pyvista.
+
+        The input's triangles with their labels are in :attr:`Subdomain.facets`, and in what :meth:`export` writes.
+        """
         pyvista = needed("pyvista")
         mesh = self.merged(subdomain)
         cells = {pyvista.CellType.TETRA: mesh.tets}
@@ -532,7 +542,8 @@ class Store:
         """Writes the mesh for another program, in the format that the ending says, as ``tetdb export`` does.
 
         ``.vtu``, ``.pvtu``, ``.vtkhdf``, ``.foam`` (OpenFOAM), ``.msh``, ``.mesh``, ``.meshb``, ``.mfem``, ``.inp``, ``.ele``, ``.npy``,
-        ``.json``; the guide says which can do what.
+        ``.json``; the guide says which can do what. ``.mesh``, ``.meshb``, ``.ele`` and ``.npy`` have numbers in place of the names in
+        :attr:`labels`; what a format has no place for, is in files beside it.
 
         Parameters
         ----------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _native, _options
+from . import _cells, _native, _options
 from ._errors import SurfaceError, TetdbError
 from ._sizes import Length, Size, length
 
@@ -92,11 +93,17 @@ class Surface:
     Parameters
     ----------
     points : (n, 3) float array, or a mesh
-        Vertices; or all at once: a PyVista ``PolyData`` of triangles, a trimesh or meshio mesh, a path, a list of paths.
+        Vertices; or all at once: a mesh of PyVista, VTK, trimesh or meshio (also a ``MultiBlock`` or a ``Scene``), a path, a list of paths.
     triangles : (m, 3) int array
         Positions in `points`, counter-clockwise seen from outside or all the other way.
     labels : (m,) array of str or int, optional
-        The label of each triangle.
+        The label of each triangle, or of each surface cell of a mesh.
+
+    Notes
+    -----
+    Polygons of meshes are cut into triangles. Of a mesh with surface cells, volume cells are left out; of one with volume cells alone the
+    boundary is the surface, as of :meth:`boundary_of`. What is left out is said by a warning and in :attr:`notes`; a mesh without either
+    is refused. Labels come from cell data ``label``, ``gmsh:physical`` or ``medit:ref``, from cell sets, and from names of blocks.
 
     Raises
     ------
@@ -132,14 +139,35 @@ class Surface:
             if isinstance(points, (list, tuple)) and points and all(map(_is_path, points)):
                 self._inner = _native.Surface.read([os.fspath(p) for p in points])
                 return
-            points, triangles, found = _of_mesh(points)
-            labels = found if labels is None else labels
+            self._inner = _of_cells(_cells.of_mesh(points), labels)
+            return
         self._inner = _of_arrays(points, triangles, labels)
 
     @classmethod
     def read(cls, *files: str | os.PathLike[str]) -> Surface:
         """Reads files as one surface: STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen; each a label unless it has its own."""
         return cls._of(_native.Surface.read([os.fspath(f) for f in files]))
+
+    @classmethod
+    def boundary_of(cls, mesh: Any) -> Surface:
+        """The boundary of a mesh of volume cells, and faces between its regions; surface cells are left out.
+
+        Regions are told by cell data ``label``, ``gmsh:physical``, ``medit:ref`` or ``region``. A triangle has the name of its region as
+        label, one between two regions both names.
+
+        Parameters
+        ----------
+        mesh : mesh or path
+            Of PyVista, VTK or meshio, with tetrahedra, pyramids, prisms or hexahedra; or a ``.msh``, ``.mesh``, ``.meshb`` or ``.ele`` file.
+        """
+        if _is_path(mesh):
+            return cls._of(_native.Surface.boundary_of(os.fspath(mesh)))
+        return cls._of(_of_cells(_cells.of_mesh(mesh, volume_only=True), None))
+
+    @classmethod
+    def _again(cls, points: Any, triangles: Any, labels: Any, notes: list[str], seeds: list[tuple[str, bool]]) -> Surface:
+        """A pickled one: with notes and seeds."""
+        return cls._of(_of_arrays(points, triangles, labels).with_extras(notes, seeds))
 
     @classmethod
     def _of(cls, native: _native.Surface) -> Surface:
@@ -162,6 +190,11 @@ class Surface:
         """(m,) str: the label of each triangle."""
         names, codes = self._inner.labels()
         return np.array(names, dtype=np.str_)[codes]
+
+    @property
+    def notes(self) -> list[str]:
+        """What was left out, cut, joined or turned when it was read."""
+        return self._inner.notes()
 
     @property
     def n_points(self) -> int:
@@ -268,8 +301,11 @@ class Surface:
         return both
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Writes ``.stl``, ``.off``, ``.obj`` or ``.ply``."""
-        self._inner.write(os.fspath(path))
+        """Writes ``.stl``, ``.off``, ``.obj`` or ``.ply``; warns of labels, embedded edges and points, and seeds that the file does not keep."""
+        labels, n_inside, n_seeds = self._inner.write(os.fspath(path))
+        for n, what in ((labels, "labels"), (n_inside, "embedded edges and points"), (n_seeds, "points that mark regions and holes")):
+            if n:
+                warnings.warn(f"{os.fspath(path)} does not keep {what}", stacklevel=2)
 
     def estimate(
         self,
@@ -305,7 +341,7 @@ class Surface:
     def __reduce__(self) -> tuple[Any, ...]:
         if self._parts:
             return self._parts
-        return Surface, (self.points, self.triangles, self.labels)
+        return Surface._again, (self.points, self.triangles, self.labels, *self._inner.extras())
 
     def __repr__(self) -> str:
         return f"<tetdb.Surface: {self.n_points} points, {self.n_triangles} triangles>"
@@ -337,21 +373,13 @@ def _is_path(value: object) -> bool:
     return isinstance(value, (str, os.PathLike))
 
 
-def _of_mesh(mesh: Any) -> tuple[Any, Any, Any]:
-    """Points, triangles and labels of another package's mesh, told by its attributes."""
-    if hasattr(mesh, "cells_dict") and hasattr(mesh, "points"):
-        return mesh.points, mesh.cells_dict.get("triangle", np.empty((0, 3), int)), None
-    if hasattr(mesh, "regular_faces") and hasattr(mesh, "points"):
-        if not mesh.is_all_triangles:
-            raise SurfaceError("unsupported-content", "the mesh has faces that are no triangles", "points", "call its triangulate() first")
-        label = mesh.cell_data["label"] if "label" in mesh.cell_data else None
-        return mesh.points, np.asarray(mesh.regular_faces).reshape(-1, 3), label
-    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
-        return mesh.vertices, mesh.faces, None
-    raise SurfaceError("unsupported-content", f"{type(mesh).__name__} is no surface", "points", "give points and triangles, a mesh of PyVista, trimesh or meshio, or paths")
+def _refuse_masked(array: Any, what: str) -> None:
+    if np.ma.is_masked(array):
+        raise SurfaceError("unsupported-content", "a value is masked", what, "give arrays without masked values")
 
 
 def _points_of(points: Any) -> npt.NDArray[np.float64]:
+    _refuse_masked(points, "points")
     try:
         xyz = np.asarray(points)
     except (TypeError, ValueError) as error:
@@ -361,8 +389,30 @@ def _points_of(points: Any) -> npt.NDArray[np.float64]:
     return np.ascontiguousarray(xyz, dtype=np.float64)
 
 
+def _of_cells(cells: _cells.Cells, labels: Any) -> _native.Surface:
+    xyz = _points_of(cells.points)
+    n = len(cells.counts)
+    bad = np.flatnonzero((cells.corners < 0) | (cells.corners >= len(xyz)))
+    if bad.size:
+        cell = int(np.searchsorted(np.cumsum(cells.counts), bad[0], side="right"))
+        raise SurfaceError("index-out-of-range", f"it names point {cells.corners[bad[0]]}, but there are {len(xyz)}", f"cell {cell}")
+    words = cells.labels if labels is None else _cells.words_of(labels, n)
+    for note in cells.notes:
+        warnings.warn(note, stacklevel=3)
+    if (cells.counts == 3).all() and not cells.notes and not cells.is_volume:
+        return _of_arrays(xyz, cells.corners.reshape(-1, 3), words)
+    counts, corners = cells.counts.astype(np.uint32), cells.corners.astype(np.uint32)
+    return _native.Surface.of_cells(xyz, counts, corners, None if words is None else _coded(words), cells.is_volume, cells.notes)
+
+
+def _coded(words: npt.NDArray[np.str_]) -> tuple[list[str], npt.NDArray[np.int64]]:
+    names, codes = np.unique(words, return_inverse=True)
+    return [str(n) for n in names], codes.astype(np.int64)
+
+
 def _of_arrays(points: Any, triangles: Any, labels: Any) -> _native.Surface:
     xyz = _points_of(points)
+    _refuse_masked(triangles, "triangles")
     try:
         tri = np.asarray(triangles)
     except (TypeError, ValueError) as error:
@@ -378,13 +428,7 @@ def _of_arrays(points: Any, triangles: Any, labels: Any) -> _native.Surface:
             f"it names point {tri[bad[0]].tolist()}, but there are {len(xyz)}",
             f"triangle {bad[0]}",
         )
-    named = None
-    if labels is not None:
-        each = np.asarray(labels)
-        if each.shape != (len(tri),) or each.dtype.kind not in "UiuO":
-            raise SurfaceError("count-mismatch", f"expected one label for each of {len(tri)} triangles, found {each.dtype} {each.shape}", "labels")
-        names, codes = np.unique(each.astype(np.str_), return_inverse=True)
-        named = [str(n) for n in names], codes.astype(np.int64)
+    named = None if labels is None else _coded(_cells.words_of(labels, len(tri)))
     return _native.Surface.of_arrays(
         xyz,
         np.ascontiguousarray(tri, dtype=np.uint32),
