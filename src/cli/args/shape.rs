@@ -80,7 +80,7 @@ pub struct ShapeArgs {
     /// A point inside a region that stays empty; may be repeated
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Regions")]
     pub hole: Vec<String>,
-    /// Seeds and holes from a file: a line `x y z name` or `x y z hole` for each
+    /// Seeds and holes from a file: a line `x y z name` or `x y z hole` for each, or with commas or semicolons
     #[arg(long, value_name = "FILE", help_heading = "Regions")]
     pub seeds: Option<PathBuf>,
     /// How much to improve the shapes of tetrahedra [default: full]

@@ -1,6 +1,6 @@
 //! Bytes of a file as words, lines or small blocks, each with its place.
 
-use std::io::{BufRead, Cursor, Read};
+use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
 
 use super::error::{FilePlace, ReadError, ReadFault, Spot};
 use tetdb_base::geom::Point;
@@ -34,10 +34,22 @@ pub(super) struct Feed<R> {
     reader: R,
     /// Length of the whole file.
     pub len: u64,
+    /// The first byte of content: 3 behind a byte order mark.
+    start: u64,
     pub at: Position,
     /// A comment runs from this byte to the end of its line.
     pub comment: Option<u8>,
     word: Vec<u8>,
+}
+
+impl<R: BufRead + Seek> Feed<R> {
+    /// Goes back to the first byte, behind a byte order mark.
+    pub fn rewind(&mut self) -> Result<()> {
+        let done = self.reader.seek(SeekFrom::Start(self.start));
+        done.map_err(|e| broken(self.place(), &e))?;
+        (self.at.offset, self.at.line) = (self.start, 1);
+        Ok(())
+    }
 }
 
 impl<R: BufRead> Feed<R> {
@@ -45,10 +57,17 @@ impl<R: BufRead> Feed<R> {
         Self {
             reader,
             len,
+            start: 0,
             at: Position { file: file.to_owned(), offset: 0, line: 1, is_binary: false },
             comment: None,
             word: Vec::new(),
         }
+    }
+
+    /// Skips the byte order mark of UTF-8 at the beginning.
+    pub fn skip_mark(&mut self) {
+        self.take(3);
+        self.start = 3;
     }
 
     /// Returns up to `N` first bytes without taking them, and their number.

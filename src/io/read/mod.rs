@@ -17,6 +17,7 @@ mod obj;
 mod off;
 mod open;
 mod ply;
+mod point_table;
 mod sink;
 mod sizes;
 mod stl;
@@ -31,13 +32,14 @@ mod tests;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
-pub use embedded::read_wires;
+pub use embedded::{read_seeds, read_wires};
 pub use embedded_sink::WireKind;
 pub use error::{FilePlace, ReadError, ReadFault, Spot};
 use feed::{Feed, Result};
 pub use lengths::read_lengths;
 pub use open::is_stream;
 use open::{open, stem, unpacked_name};
+pub use point_table::{PointColumns, PointRow, PointTable};
 use sink::SurfaceSink;
 pub use sizes::{FileSizes, read_sizes, size_files};
 
