@@ -21,7 +21,7 @@ fn points_are_the_same_in_every_dialect_and_option() {
         );
         place.run_line(&line).succeeds();
         digests.push(place.digest("p.tetdb"));
-        let named = place.run_line("query p.tetdb --json --label in:probe").succeeds();
+        let named = place.run_line("query p.tetdb --json --label in").succeeds();
         assert!(!named.stdout().is_empty(), "{file}");
         let answer = place.run_line(&format!("query p.tetdb --csv --points {file}")).succeeds();
         assert!(answer.stdout().contains("\n0.25,0.5,0.75,"), "{file}: {}", answer.stdout());
@@ -48,7 +48,7 @@ fn lines_with_two_readings_are_refused_by_every_option() {
         let run = place.run_line(&format!("{line} --json"));
         let error = run.error();
         assert_eq!((run.exit(), error["code"].as_str()), (Some(3), Some(code)), "{error}");
-        assert!(error["place"].as_str().is_some_and(|p| p.ends_with("ids.txt, line 2")), "{error}");
+        assert!(error["where"].as_str().is_some_and(|p| p.ends_with("ids.txt, line 2")), "{error}");
         let message = error["message"].as_str().unwrap_or_default();
         assert!(message.contains("x 1, y 0.25") && message.contains("x 0.25, y 0.5"), "{message}");
         assert!(error["help"].as_str().is_some_and(|h| h.contains("id x y z")), "{error}");

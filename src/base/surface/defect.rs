@@ -48,6 +48,14 @@ pub enum SurfaceError {
         /// Number of vertices.
         n_vertices: usize,
     },
+    /// A polygon or facet cannot be cut into triangles.
+    #[error("a polygon of {} corners, the first at {}, {reason}", points.len(), show(points.first().copied().unwrap_or_default()))]
+    Polygon {
+        /// The reason.
+        reason: &'static str,
+        /// Its corners.
+        points: Vec<Point>,
+    },
     /// The surface is too small to compute with exactly.
     #[error(
         "the surface is too small to compute with exactly: its longest extent is {extent:e}, expected above 1e-24"
@@ -93,6 +101,7 @@ impl SurfaceError {
             Self::TooLarge { .. } => Code::SurfaceTooLarge,
             Self::Memory { .. } | Self::EmbedMemory { .. } => Code::Memory,
             Self::NoSuchVertex { .. } => Code::IndexOutOfRange,
+            Self::Polygon { reason, .. } => super::polygon::code(reason),
             Self::TooSmall { .. } => Code::CoordinateRange,
             Self::Invalid { defect, .. } => defect.code(),
             Self::Embed(wire) => wire.code(),
@@ -106,6 +115,9 @@ impl SurfaceError {
             Self::Memory { .. } => "allow more memory, or take a coarser surface",
             Self::EmbedMemory { .. } => "allow more memory, or take fewer edges and points",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
+            Self::Polygon { .. } => {
+                "give it as simple polygons or as triangles, in the program the surface comes from"
+            }
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),
             Self::Embed(wire) => wire.help(),

@@ -133,6 +133,11 @@ pub enum NoteKind {
         /// Number of polygons.
         n: u64,
     },
+    /// Polygons with dents or with corners in line were cut otherwise.
+    CutPolygons {
+        /// Number of polygons.
+        n: u64,
+    },
     /// Elements that are no part of a surface (tetrahedra, lines, …) were left out.
     SkippedElements {
         /// The kind of element.
@@ -178,6 +183,12 @@ impl fmt::Display for Note {
             }
             NoteKind::FannedPolygons { n } => {
                 write!(f, "{n} polygons were cut into triangles from their first vertex")
+            }
+            NoteKind::CutPolygons { n } => {
+                write!(
+                    f,
+                    "{n} polygons with dents or corners in line were cut into the triangles of their plane"
+                )
             }
             NoteKind::SkippedElements { what, n } => {
                 write!(f, "{n} {what} were left out; only the surface is read")

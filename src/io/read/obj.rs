@@ -75,7 +75,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                     return Err(unexpected(&place, "a face of at least 3 corners", &line));
                 }
                 let label = *label.get_or_insert_with(|| target.label(names.best()));
-                feed.placed(target.builder.polygon(&corners, label))?;
+                let added = target.builder.polygon(&corners, label);
+                added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
             }
             b"l" | b"p" => n_lines_points += 1,
             word if names.take(word, &line) => label = None,

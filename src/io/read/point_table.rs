@@ -380,7 +380,10 @@ impl PointTable {
                 let found = format!("{} in {line}", quote(word.as_bytes()));
                 place.refuse(ReadFault::NotANumber { what: "a coordinate", found })
             }
-            Misfit::TooFew(n) => unexpected(expected, format!("{n} columns in {line}")),
+            Misfit::TooFew(n) => {
+                let found = format!("only {n} columns in {line}");
+                place.refuse(ReadFault::NotANumber { what: "a coordinate", found })
+            }
             Misfit::TooMany => unexpected(expected, line),
         }
     }
@@ -481,7 +484,7 @@ mod tests {
             ("1,5,2,5,3,5\n", 1, "three numbers and at most a name"),
             ("1,5;2;3\n1.5;2;3\n", 2, "a coordinate"),
             ("1 2 3\n1;2;3\n", 2, "`1;2;3`"),
-            ("1 2\n", 1, "2 columns"),
+            ("1 2\n", 1, "only 2 columns"),
             ("1 2 nan\n", 1, "`nan`"),
             ("1.000,5;2;3\n", 1, "`1.000,5`"),
             ("OFF\n8 12 0\n", 1, "x, y and z"),
