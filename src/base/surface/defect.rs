@@ -49,7 +49,7 @@ pub enum SurfaceError {
         n_vertices: usize,
     },
     /// A polygon or facet cannot be cut into triangles.
-    #[error("a polygon of {} corners, the first at {}, {reason}", points.len(), show(points.first().copied().unwrap_or_default()))]
+    #[error("a polygon or facet of {} corners, the first at {}, {reason}", points.len(), show(points.first().copied().unwrap_or_default()))]
     Polygon {
         /// The reason.
         reason: &'static str,

@@ -123,8 +123,7 @@ pub(super) fn cut_facet(
 ) -> Result<Triangles, Uncut> {
     let loops = polygons.iter().filter(|p| p.len() > 2);
     let mut planes = loops.filter_map(|p| Plane::new(p.iter().map(|&v| points[v as usize])).ok());
-    // The edges of a facet may be given one by one.
-    let plane = planes.next().map_or_else(|| Plane::new(widest(points).into_iter()), Ok)?;
+    let plane = planes.next().ok_or(FLAT)?;
     cut(points, polygons, holes, &plane, false)
 }
 
@@ -136,17 +135,6 @@ fn thinnest(points: &[Point], triangles: impl Iterator<Item = [u32; 3]>) -> f64 
         (b - a).cross(c - a).length() / longest
     };
     triangles.map(thin).fold(f64::INFINITY, f64::min)
-}
-
-/// Three points that are far from each other and from one line.
-fn widest(points: &[Point]) -> [Point; 3] {
-    let farthest = |measure: &dyn Fn(Point) -> f64| {
-        let points = points.iter().copied();
-        points.max_by(|a, b| measure(*a).total_cmp(&measure(*b))).unwrap_or_default()
-    };
-    let a = points.first().copied().unwrap_or_default();
-    let b = farthest(&|p| p.distance_squared(a));
-    [a, b, farthest(&|p| (p - a).cross(b - a).length_squared())]
 }
 
 fn cut(
@@ -356,8 +344,6 @@ mod tests {
         let split =
             cut_facet(&points, &[outer, &[6, 8], &[8], inner], &[hole]).expect("an edge in it");
         assert!(split.iter().any(|t| t.contains(&6) && t.contains(&8)));
-        let loose: [&[u32]; 4] = [&[0, 1], &[2, 1], &[2, 3], &[3, 0]];
-        assert_eq!(cut_facet(&points[..4], &loose, &[]).map(|t| t.len()), Ok(2));
         assert_eq!(cut_facet(&points, &[outer, &[4, 8], &[5, 7]], &[]), Err(CROSSED));
         assert_eq!(cut_facet(&points, &[outer], &[Point::splat(9.0)]), Err(HOLE));
         assert_eq!(cut_facet(&points[..2], &[&[0, 1]], &[]), Err(FLAT));

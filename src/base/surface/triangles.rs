@@ -152,9 +152,14 @@ pub enum NoteKind {
         /// Number of points.
         n: u64,
     },
-    /// A planar facet of several polygons or with holes was taken polygon by polygon.
-    SplitFacets {
+    /// Facets of several polygons or with holes were cut as a whole.
+    CutFacets {
         /// Number of facets.
+        n: u64,
+    },
+    /// Polygons of two corners are edges to embed.
+    Edges {
+        /// Number of edges.
         n: u64,
     },
 }
@@ -206,10 +211,15 @@ impl fmt::Display for Note {
                 };
                 write!(f, "{what} ({n}) {use_of}")
             }
-            NoteKind::SplitFacets { n } => write!(
-                f,
-                "{n} facets have several polygons or holes; each polygon was taken for itself"
-            ),
+            NoteKind::CutFacets { n } => {
+                write!(f, "{n} facets of several polygons or with holes were cut as a whole")
+            }
+            NoteKind::Edges { n } => {
+                write!(
+                    f,
+                    "{n} polygons of two corners are edges, embedded where the surface is meshed"
+                )
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::polygon::cut_polygon;
+use super::polygon::{cut_facet, cut_polygon};
 use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
 use crate::geom::Point;
 use crate::storage::{filled, push};
@@ -158,6 +158,43 @@ impl SurfaceBuilder {
             None => (corners[1..].windows(2))
                 .try_for_each(|pair| self.triangle([corners[0], pair[0], pair[1]], label)),
         }
+    }
+
+    /// Adds a facet of vertices of the file: what its polygons enclose, without the parts around its holes. Polygons of one or two
+    /// corners are vertices and edges in it; one has at least three.
+    ///
+    /// # Errors
+    /// As [`SurfaceBuilder::polygon`]; a hole that is not inside.
+    pub fn facet(
+        &mut self,
+        polygons: &[Vec<u32>],
+        holes: &[Point],
+        label: u32,
+    ) -> Result<(), SurfaceError> {
+        if let ([polygon], []) = (polygons, holes) {
+            return self.polygon(polygon, label);
+        }
+        // Vertices of the file with one position are one corner.
+        let (mut known, mut vertices) = (HashMap::new(), Vec::new());
+        let mut corner = |&v: &u32| {
+            let vert = self.file2vert.get(v as usize).ok_or(SurfaceError::NoSuchVertex {
+                triangle: (self.surface.triangles.len() - self.triangle_first) as u32,
+                vertex: v,
+                n_vertices: self.file2vert.len(),
+            })?;
+            Ok(*known.entry(*vert).or_insert_with(|| {
+                vertices.push(v);
+                vertices.len() as u32 - 1
+            }))
+        };
+        let polygons = polygons.iter().map(|polygon| polygon.iter().map(&mut corner).collect());
+        let polygons = polygons.collect::<Result<Vec<Vec<u32>>, SurfaceError>>()?;
+        let polygons: Vec<&[u32]> = polygons.iter().map(Vec::as_slice).collect();
+        let points = self.positions(&vertices).unwrap_or_default();
+        let cut = cut_facet(&points, &polygons, holes);
+        let triangles = cut.map_err(|reason| SurfaceError::Polygon { reason, points })?;
+        let triangles = triangles.into_iter().map(|t| t.map(|k| vertices[k as usize]));
+        triangles.into_iter().try_for_each(|t| self.triangle(t, label))
     }
 
     /// Triangles of a polygon instead of its fan; `None` while a vertex is not known.

@@ -117,7 +117,8 @@ impl Surface {
         let paths: Vec<PathBuf> = files.into_iter().map(|p| p.as_ref().to_owned()).collect();
         guarded(&Settings::new(), || {
             let cap = Settings::new().cap()?;
-            Self::read_in(&paths, cap)?.oriented(&ScratchSpace::boundless())
+            let scratch = ScratchSpace::boundless();
+            Self::read_in(&paths, cap)?.oriented(&scratch)?.with_own_edges(&scratch)
         })
     }
 

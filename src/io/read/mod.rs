@@ -2,7 +2,8 @@
 //!
 //! A declared count is compared with the length of the file before it is used; every error
 //! has its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
-//! become doubles exactly. Polygons are fanned, vertices with identical bits are one.
+//! become doubles exactly. Polygons are cut into triangles, vertices with identical bits
+//! are one.
 
 mod embedded;
 mod embedded_sink;
