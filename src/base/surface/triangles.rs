@@ -34,6 +34,10 @@ pub struct Surface {
     pub notes: Vec<Note>,
     /// Seeds from the files, in order.
     pub seeds: Vec<Seed>,
+    /// Without another rule, volumes without a seed are filled, as in TetGen's files; else they stay empty where there are seeds.
+    pub fills_rest: bool,
+    /// Lengths that the files ask for, with the names of their regions.
+    pub region_sizes: Vec<(String, f64)>,
 }
 
 /// One file of a surface and the triangles that came from it.
@@ -152,6 +156,16 @@ pub enum NoteKind {
         /// Number of points.
         n: u64,
     },
+    /// Regions whose solid elements belong to several groups have no name.
+    MixedRegions {
+        /// Number of regions.
+        n: u64,
+    },
+    /// Curved faces were taken as flat ones between their corners.
+    CurvedFaces {
+        /// Number of faces.
+        n: u64,
+    },
     /// Facets of several polygons or with holes were cut as a whole.
     CutFacets {
         /// Number of facets.
@@ -200,16 +214,19 @@ impl fmt::Display for Note {
             }
             NoteKind::VolumePoints { points, n } => {
                 let (what, use_of) = match points {
-                    VolumePoints::Holes => (
-                        "hole points",
-                        "count where regions are filled by seeds, and are ignored else",
-                    ),
-                    VolumePoints::Regions => (
-                        "regions with an attribute or reference",
-                        "are named by it, and are what is filled where regions are filled by seeds",
-                    ),
+                    VolumePoints::Holes => ("hole points", "leave their regions empty"),
+                    VolumePoints::Regions => ("regions of the file", "are filled and named so"),
                 };
-                write!(f, "{what} ({n}) {use_of}")
+                write!(f, "{what} ({n}) {use_of}, unless another rule fills regions")
+            }
+            NoteKind::MixedRegions { n } => {
+                write!(
+                    f,
+                    "{n} regions hold elements of several groups with no triangles between them, and get no name"
+                )
+            }
+            NoteKind::CurvedFaces { n } => {
+                write!(f, "{n} curved faces were taken as flat ones between their corners")
             }
             NoteKind::CutFacets { n } => {
                 write!(f, "{n} facets of several polygons or with holes were cut as a whole")

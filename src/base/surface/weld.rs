@@ -54,7 +54,12 @@ impl SurfaceBuilder {
 
     /// Refuses to exceed the memory cap; called before an array grows.
     fn check_bytes(&self) -> Result<(), SurfaceError> {
-        match self.bytes_max.filter(|&most| self.bytes() > most) {
+        self.check_more(0)
+    }
+
+    /// Refuses `more` bytes that do not fit beside what it holds.
+    pub fn check_more(&self, more: u64) -> Result<(), SurfaceError> {
+        match self.bytes_max.filter(|&most| self.bytes() + more > most) {
             None => Ok(()),
             Some(bytes_max) => Err(SurfaceError::Memory {
                 bytes_max,
@@ -259,6 +264,37 @@ impl SurfaceBuilder {
             sum += p;
         }
         Some(0.25 * sum)
+    }
+
+    /// Volume of a tetrahedron of vertices of the current file, where it has them.
+    pub fn volume(&self, corners: [u32; 4]) -> Option<f64> {
+        let p = self.positions(&corners)?;
+        Some((p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]).abs())
+    }
+
+    /// The welded vertex of a vertex of the current file.
+    pub fn welded(&self, vertex: u32) -> Option<u32> {
+        self.file2vert.get(vertex as usize).copied()
+    }
+
+    /// Triangles of the current file so far, as vertices of the file.
+    pub fn file_triangles(&self) -> impl Iterator<Item = &[u32; 3]> {
+        self.surface.triangles[self.triangle_first..].iter()
+    }
+
+    /// Marks all volumes of the surface as filled but those with a hole.
+    pub fn fill_rest(&mut self) {
+        self.surface.fills_rest = true;
+    }
+
+    /// Asks for a length in the region of a name.
+    pub fn region_size(&mut self, name: String, h: f64) {
+        self.surface.region_sizes.push((name, h));
+    }
+
+    /// Lengths asked for in regions so far.
+    pub fn region_sizes(&self) -> &[(String, f64)] {
+        &self.surface.region_sizes
     }
 
     /// Adds a note about the current file.

@@ -3,11 +3,12 @@
 //! Sections this reader does not need are passed over. An element in several physical groups is
 //! given to the first (4.1); 2.2 repeats such elements, and validation reports the repetition.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::io::BufRead;
 
 use super::feed::{Feed, name};
-use super::gmsh_numbers::{GmshNumbers, NodeTags, Role, need_element_type};
+use super::gmsh_numbers::{ElementType, GmshNumbers, NodeTags, Role, need_element_type};
+use super::solids::Solids;
 use super::{ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
@@ -25,14 +26,11 @@ struct GmshReader<'a, 'b, R> {
     inside: HashSet<i64>,
     /// The label used last and the group it came from.
     last: Option<(i64, u32)>,
-    n_solids: u64,
+    solids: Solids,
+    n_curved: u64,
     /// Names and groups of volumes, as of surfaces.
     volume_names: HashMap<i64, String>,
     volume_groups: HashMap<i64, i64>,
-    /// By name of a volume's group, the first tetrahedron of each volume.
-    first_tets: BTreeMap<String, Vec<[u32; 4]>>,
-    /// The groups and volumes whose first tetrahedron is known.
-    seen: HashSet<(i64, i64)>,
 }
 
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
@@ -74,19 +72,16 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         groups: HashMap::new(),
         inside: HashSet::new(),
         last: None,
-        n_solids: 0,
+        solids: Solids::default(),
+        n_curved: 0,
         volume_names: HashMap::new(),
         volume_groups: HashMap::new(),
-        first_tets: BTreeMap::new(),
-        seen: HashSet::new(),
     };
     mesh.read_sections(version)?;
-    if mesh.n_solids > 0 {
-        let n = mesh.n_solids;
-        mesh.target.builder.note(NoteKind::SkippedElements { what: "solid elements", n });
-        let first = std::mem::take(&mut mesh.first_tets);
-        mesh.target.regions_of_mesh(&first);
+    if mesh.n_curved > 0 {
+        mesh.target.builder.note(NoteKind::CurvedFaces { n: mesh.n_curved });
     }
+    std::mem::take(&mut mesh.solids).finish("solid elements", mesh.target);
     mesh.numbers.feed.finish(mesh.target.builder)
 }
 
@@ -162,23 +157,6 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         label
     }
 
-    /// Keeps the first tetrahedron of each volume in a physical group.
-    fn solid(&mut self, kind: i64, tags: &[i64; 4], group: i64, volume: i64) -> Result<()> {
-        self.n_solids += 1;
-        let is_tet = kind == 4 || kind == 11;
-        if group == 0 || !is_tet || !self.seen.insert((group, volume)) {
-            return Ok(());
-        }
-        let mut corners = [0; 4];
-        for (corner, tag) in corners.iter_mut().zip(tags) {
-            *corner = self.nodes.find(*tag, &self.numbers.feed)?;
-        }
-        let known = self.volume_names.get(&group).cloned();
-        let name = known.unwrap_or_else(|| format!("volume_{group}"));
-        self.first_tets.entry(name).or_default().push(corners);
-        Ok(())
-    }
-
     fn node(&mut self, tag: i64, p: Point) -> Result<()> {
         if !self.nodes.push(tag) {
             let found = format!("node {tag} a second time");
@@ -192,13 +170,28 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         Ok(Point::new(self.numbers.double()?, self.numbers.double()?, self.numbers.double()?))
     }
 
-    fn face(&mut self, tags: &[i64], group: i64) -> Result<()> {
-        let mut corners = [0; 4];
-        for (corner, tag) in corners.iter_mut().zip(tags) {
+    /// Takes the nodes of an element as a face or a solid; the first ones are its corners.
+    fn element(&mut self, kind: ElementType, tags: &[i64; 8], group: i64) -> Result<()> {
+        let ElementType { n_nodes, n_corners, role } = kind;
+        if role == Role::Thin {
+            return Ok(());
+        }
+        let mut corners = [0; 8];
+        for (corner, tag) in corners.iter_mut().zip(&tags[..n_corners]) {
             *corner = self.nodes.find(*tag, &self.numbers.feed)?;
         }
-        let label = self.label(group);
-        self.numbers.feed.placed(self.target.builder.polygon(&corners[..tags.len()], label))
+        let corners = &corners[..n_corners];
+        if role == Role::Face {
+            self.n_curved += u64::from(n_nodes > n_corners);
+            let label = self.label(group);
+            return self.numbers.feed.placed(self.target.builder.polygon(corners, label));
+        }
+        let name = match (group, self.volume_names.get(&group)) {
+            (0, _) => String::new(),
+            (_, Some(name)) => name.clone(),
+            _ => format!("volume_{group}"),
+        };
+        self.numbers.feed.placed(self.solids.add(corners, &name, self.target))
     }
 
     // --- 2.2 ----------------------------------------------------------------------------------
@@ -262,28 +255,22 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     /// The tags and nodes of one element.
     fn read_element_2(&mut self, kind: i64, n_tags: i64) -> Result<()> {
         let n_tags = self.numbers.check_count("element tags", n_tags, 1, 4)?;
-        let (mut group, mut entity) = (0, 0);
+        let mut group = 0;
         for i in 0..n_tags {
             let tag = self.numbers.int()?;
-            match i {
-                0 => group = tag,
-                1 => entity = tag,
-                _ => {}
+            if i == 0 {
+                group = tag;
             }
         }
-        let (n_nodes, role) = need_element_type(kind, &self.numbers.feed)?;
-        let mut tags = [0; 4];
-        for i in 0..n_nodes {
+        let kind = need_element_type(kind, &self.numbers.feed)?;
+        let mut tags = [0; 8];
+        for i in 0..kind.n_nodes {
             let tag = self.numbers.int()?;
             if let Some(slot) = tags.get_mut(i) {
                 *slot = tag;
             }
         }
-        match role {
-            Role::Face => self.face(&tags[..n_nodes], group),
-            Role::Solid => self.solid(kind, &tags, group, entity),
-            _ => Ok(()),
-        }
+        self.element(kind, &tags, group)
     }
 
     // --- 4.1 ----------------------------------------------------------------------------------
@@ -395,7 +382,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         for i in 0..n_blocks {
             self.numbers.need_record("blocks", n_blocks, i)?;
             let (dimension, entity, kind, n) = self.block("elements", 2)?;
-            let (n_nodes, role) = need_element_type(kind, &self.numbers.feed)?;
+            let kind = need_element_type(kind, &self.numbers.feed)?;
             let groups = match dimension {
                 2 => Some(&self.groups),
                 3 => Some(&self.volume_groups),
@@ -406,18 +393,15 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             for k in 0..n {
                 self.numbers.need_record("elements", n, k)?;
                 self.numbers.size()?;
-                let mut tags = [0; 4];
-                for j in 0..n_nodes {
+                let mut tags = [0; 8];
+                for j in 0..kind.n_nodes {
                     let tag = self.numbers.size()?;
                     if let Some(slot) = tags.get_mut(j) {
                         *slot = tag;
                     }
                 }
-                match role {
-                    Role::Face if is_inside => {}
-                    Role::Face => self.face(&tags[..n_nodes], group)?,
-                    Role::Solid => self.solid(kind, &tags, group, entity)?,
-                    _ => {}
+                if !(is_inside && kind.role == Role::Face) {
+                    self.element(kind, &tags, group)?;
                 }
             }
             found += n;

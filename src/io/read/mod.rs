@@ -21,6 +21,7 @@ mod ply;
 mod point_table;
 mod sink;
 mod sizes;
+mod solids;
 mod stl;
 mod tetgen;
 mod vtk;

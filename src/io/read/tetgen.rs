@@ -1,7 +1,8 @@
 //! TetGen `.smesh` and `.poly`, with the points in the file or in the `.node` file beside it.
 //!
 //! A facet is what its polygons enclose, without the parts around its hole points. Polygons of two corners are edges to embed.
-//! Points that mark holes and regions of the volume become seeds; a region gets the name `attribute_N` of its attribute.
+//! Points that mark holes and regions of the volume become seeds; a region gets the name `attribute_N` of its attribute, and a
+//! length from its largest volume.
 
 use std::collections::HashSet;
 use std::io::BufRead;
@@ -98,13 +99,44 @@ fn read_volume_points<R: BufRead>(
                     true => name(feed.word()),
                     false => "0".to_owned(),
                 };
-                target.region(point, &format!("attribute_{attribute}"));
+                let name = target.region(point, &format!("attribute_{attribute}"));
+                if feed.next_word_in_line()? {
+                    let volume: f64 = feed.parse("the largest volume of a tetrahedron")?;
+                    ask_volume(feed, name, volume, target)?;
+                }
             }
         }
         feed.skip_line()?;
     }
     target.note_points(points, n);
+    if n > 0 {
+        target.builder.fill_rest();
+    }
     Ok(())
+}
+
+/// Asks for the edges of regular tetrahedra of a volume in a region; none is asked for by volumes of zero and less.
+fn ask_volume<R: BufRead>(
+    feed: &Feed<R>,
+    name: String,
+    volume: f64,
+    target: &mut SurfaceSink,
+) -> Result<()> {
+    let h = (72f64.sqrt() * volume).cbrt();
+    let known = target.builder.region_sizes().iter().find(|(of, _)| *of == name);
+    match known.map(|(_, known)| *known) {
+        _ if h.is_nan() => Err(feed.unexpected("a volume", feed.word())),
+        _ if h <= 0.0 => Ok(()),
+        Some(known) if known == h => Ok(()),
+        Some(_) => {
+            let what = format!("another largest volume for a second region {name}");
+            Err(feed.unsupported(what))
+        }
+        None => {
+            target.builder.region_size(name, h);
+            Ok(())
+        }
+    }
 }
 
 fn read_node_file<R: BufRead>(

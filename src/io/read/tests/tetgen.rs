@@ -86,3 +86,32 @@ fn facets_with_holes_are_cut_as_a_whole() {
     assert!(tetdb_base::surface::validate(&surface).accept().is_ok());
     assert!(surface.notes.iter().any(|n| n.kind == NoteKind::Edges { n: 2 }));
 }
+
+#[test]
+fn regions_ask_for_lengths() {
+    let poly = |regions: &str| {
+        format!(
+            "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n4 0\n1\n3 1 2 3\n1\n3 0 3 2\n1\n3 0 1 3\n1\n3 0 2 1\n0\n{regions}"
+        )
+    };
+    for (regions, expected) in [
+        ("1\n1 .1 .1 .1 7 0.001\n", Some(("attribute_7", 0.001))),
+        ("2\n1 .1 .1 .1 7 -1\n2 .1 .1 .2 8 2e-6\n", Some(("attribute_8", 2e-6))),
+        ("2\n1 .1 .1 .1 3 0.5\n2 .1 .1 .2 3 0.5 # twice\n", Some(("attribute_3", 0.5))),
+        ("1\n1 .1 .1 .1 7\n", None),
+    ] {
+        let surface = read(Format::TetgenPoly, poly(regions)).expect(regions);
+        assert!(surface.fills_rest);
+        // A regular tetrahedron of edge h has the volume h^3 / (6 sqrt 2).
+        let found =
+            surface.region_sizes.first().map(|(name, h)| (name.as_str(), h.powi(3) / 72f64.sqrt()));
+        assert_eq!(found.map(|f| f.0), expected.map(|e| e.0));
+        if let (Some((_, found)), Some((_, volume))) = (found, expected) {
+            assert!((found / volume - 1.0).abs() < 1e-12);
+        }
+    }
+    let two = poly("2\n1 .1 .1 .1 3 0.5\n2 .1 .1 .2 3 0.25\n");
+    assert_eq!(refuse(Format::TetgenPoly, two), ("unsupported-content", Spot::Line(18)));
+    assert_eq!(refuse(Format::TetgenPoly, poly("1\n1 .1 .1 .1 3 small\n")).0, "not-a-number");
+    assert_eq!(refuse(Format::TetgenPoly, poly("1\n1 .1 .1 .1 3 nan\n")).0, "unexpected-text");
+}
