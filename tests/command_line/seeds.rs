@@ -29,7 +29,7 @@ fn regions(place: &Place, store: &str) -> Vec<(Option<String>, bool)> {
 
 fn tets(place: &Place, store: &str) -> u64 {
     let info = place.run_line(&format!("info {store} --json")).succeeds().json();
-    info["n_tets"].as_u64().expect("a number")
+    info["tets"].as_u64().expect("a number")
 }
 
 #[test]

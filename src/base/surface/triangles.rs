@@ -161,6 +161,16 @@ pub enum NoteKind {
         /// Number of regions.
         n: u64,
     },
+    /// Groups some of whose faces belong to another group too, which gives them their label.
+    OtherGroups {
+        /// Names of the groups.
+        names: String,
+    },
+    /// Bytes behind the content of a file were left out.
+    TrailingBytes {
+        /// Number of bytes.
+        n: u64,
+    },
     /// Curved faces were taken as flat ones between their corners.
     CurvedFaces {
         /// Number of faces.
@@ -224,6 +234,13 @@ impl fmt::Display for Note {
                     f,
                     "{n} regions hold elements of several groups with no triangles between them, and get no name"
                 )
+            }
+            NoteKind::OtherGroups { names } => write!(
+                f,
+                "faces of the groups {names} belong to another group before, and have its label"
+            ),
+            NoteKind::TrailingBytes { n } => {
+                write!(f, "{n} bytes behind the declared content were left out")
             }
             NoteKind::CurvedFaces { n } => {
                 write!(f, "{n} curved faces were taken as flat ones between their corners")

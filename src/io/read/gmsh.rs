@@ -1,9 +1,9 @@
-//! Gmsh `.msh` 2.2 and 4.1, text and binary: triangles and quadrilaterals, physical groups as labels.
+//! Gmsh `.msh` of versions 1, 2, 4.0 and 4.1, text and binary: triangles and quadrilaterals, physical groups as labels.
 //!
-//! Sections this reader does not need are passed over. An element in several physical groups is
-//! given to the first (4.1); 2.2 repeats such elements, and validation reports the repetition.
+//! Sections this reader does not need are passed over. An element in several physical groups is given to the first, with a note;
+//! version 2 repeats such elements, one behind the other. Curved faces are taken by their corners.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::io::BufRead;
 
 use super::feed::{Feed, name};
@@ -16,6 +16,7 @@ use tetdb_base::surface::NoteKind;
 /// State of a reader that all sections of a file share.
 struct GmshReader<'a, 'b, R> {
     numbers: GmshNumbers<R>,
+    version: Version,
     target: &'a mut SurfaceSink<'b>,
     nodes: NodeTags,
     /// Names of the surface groups.
@@ -26,6 +27,10 @@ struct GmshReader<'a, 'b, R> {
     inside: HashSet<i64>,
     /// The label used last and the group it came from.
     last: Option<(i64, u32)>,
+    /// Corners and group of the last element.
+    last_element: Option<(ElementType, [i64; 8], i64)>,
+    /// Surface groups with elements that another group has too.
+    other_groups: BTreeSet<i64>,
     solids: Solids,
     n_curved: u64,
     /// Names and groups of volumes, as of surfaces.
@@ -33,15 +38,62 @@ struct GmshReader<'a, 'b, R> {
     volume_groups: HashMap<i64, i64>,
 }
 
+/// A version of the format.
+#[derive(Clone, Copy, PartialEq)]
+enum Version {
+    V1,
+    V2,
+    V40,
+    V41,
+}
+
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
-    feed.need_keyword("$MeshFormat")?;
+    feed.need_word("`$MeshFormat`")?;
+    let (version, binary, big) = match feed.word() {
+        b"$NOD" | b"$ELM" => (Version::V1, false, false),
+        b"$MeshFormat" => read_format(&mut feed)?,
+        word => return Err(feed.unexpected("`$MeshFormat`, or `$NOD` of version 1", word)),
+    };
+    let mut mesh = GmshReader {
+        numbers: GmshNumbers { feed, binary, big },
+        version,
+        target,
+        nodes: NodeTags::default(),
+        names: HashMap::new(),
+        groups: HashMap::new(),
+        inside: HashSet::new(),
+        last: None,
+        last_element: None,
+        other_groups: BTreeSet::new(),
+        solids: Solids::default(),
+        n_curved: 0,
+        volume_names: HashMap::new(),
+        volume_groups: HashMap::new(),
+    };
+    mesh.read_sections()?;
+    if mesh.n_curved > 0 {
+        mesh.target.builder.note(NoteKind::CurvedFaces { n: mesh.n_curved });
+    }
+    if !mesh.other_groups.is_empty() {
+        let names: Vec<String> = mesh.other_groups.iter().map(|&g| mesh.group_name(g)).collect();
+        mesh.target.builder.note(NoteKind::OtherGroups { names: names.join(", ") });
+    }
+    std::mem::take(&mut mesh.solids).finish("solid elements", mesh.target);
+    mesh.numbers.feed.finish(mesh.target.builder)
+}
+
+/// The section `$MeshFormat`: the version, whether numbers are binary, and whether their high bytes come first.
+fn read_format<R: BufRead>(feed: &mut Feed<R>) -> Result<(Version, bool, bool)> {
     feed.need_word("the format's version")?;
     let version = match feed.word() {
-        b"2" | b"2.0" | b"2.1" | b"2.2" => 2,
-        b"4.1" => 4,
+        b"2" | b"2.0" | b"2.1" | b"2.2" => Version::V2,
+        b"4" | b"4.0" => Version::V40,
+        b"4.1" => Version::V41,
         other => {
             let found = super::feed::quote(other);
-            return Err(feed.unsupported(format!("version {found} of .msh (2.2 and 4.1 can)")));
+            return Err(
+                feed.unsupported(format!("version {found} of .msh (1, 2, 4.0 and 4.1 can)"))
+            );
         }
     };
     let binary = match feed.integer("0 for text or 1 for binary")? {
@@ -64,39 +116,25 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     }
     feed.need_keyword("$EndMeshFormat")?;
     feed.skip_line()?;
-    let mut mesh = GmshReader {
-        numbers: GmshNumbers { feed, binary, big },
-        target,
-        nodes: NodeTags::default(),
-        names: HashMap::new(),
-        groups: HashMap::new(),
-        inside: HashSet::new(),
-        last: None,
-        solids: Solids::default(),
-        n_curved: 0,
-        volume_names: HashMap::new(),
-        volume_groups: HashMap::new(),
-    };
-    mesh.read_sections(version)?;
-    if mesh.n_curved > 0 {
-        mesh.target.builder.note(NoteKind::CurvedFaces { n: mesh.n_curved });
-    }
-    std::mem::take(&mut mesh.solids).finish("solid elements", mesh.target);
-    mesh.numbers.feed.finish(mesh.target.builder)
+    Ok((version, binary, big))
 }
 
 impl<R: BufRead> GmshReader<'_, '_, R> {
-    fn read_sections(&mut self, version: u32) -> Result<()> {
-        while self.numbers.feed.next_word()? {
+    fn read_sections(&mut self) -> Result<()> {
+        use Version::{V1, V2, V40, V41};
+        // The first section of version 1 has no head before it.
+        let mut is_taken = self.version == V1;
+        while is_taken || self.numbers.feed.next_word()? {
+            is_taken = false;
             let section = self.numbers.feed.word().to_vec();
             if section.first() != Some(&b'$') {
                 return Err(self.numbers.feed.unexpected("a section beginning with `$`", &section));
             }
             self.numbers.feed.skip_line()?;
-            match (section.as_slice(), version) {
+            match (section.as_slice(), self.version) {
                 (b"$PhysicalNames", _) => self.read_names()?,
-                (b"$Entities", 4) => self.read_entities(false)?,
-                (b"$PartitionedEntities", 4) => {
+                (b"$Entities", V40 | V41) => self.read_entities(false)?,
+                (b"$PartitionedEntities", V40 | V41) => {
                     self.numbers.size()?;
                     let n_ghosts = self.numbers.size()?;
                     for _ in 0..self.numbers.check_count("ghosts", n_ghosts, 2, 4)? {
@@ -105,14 +143,17 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                     }
                     self.read_entities(true)?;
                 }
-                (b"$Nodes", 2) => self.read_nodes_2()?,
+                (b"$NOD", V1) => self.read_nodes_2(false, "$ENDNOD")?,
+                (b"$ELM", V1) => self.read_elements_2_text("$ENDELM")?,
+                (b"$Nodes", V2) => self.read_nodes_2(false, "$EndNodes")?,
+                (b"$ParametricNodes", V2) => self.read_nodes_2(true, "$EndParametricNodes")?,
                 (b"$Nodes", _) => self.read_nodes_4()?,
-                (b"$Elements", 2) if self.numbers.binary => self.read_elements_2_binary()?,
-                (b"$Elements", 2) => self.read_elements_2_text()?,
+                (b"$Elements", V2) if self.numbers.binary => self.read_elements_2_binary()?,
+                (b"$Elements", V2) => self.read_elements_2_text("$EndElements")?,
                 (b"$Elements", _) => self.read_elements_4()?,
                 _ => {
-                    let end = [b"$End", &section[1..]].concat();
-                    self.numbers.feed.skip_past(&end)?;
+                    let end: &[u8] = if self.version == V1 { b"$END" } else { b"$End" };
+                    self.numbers.feed.skip_past(&[end, &section[1..]].concat())?;
                 }
             }
         }
@@ -141,6 +182,10 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         self.numbers.end("$EndPhysicalNames")
     }
 
+    fn group_name(&self, group: i64) -> String {
+        self.names.get(&group).cloned().unwrap_or_else(|| group.to_string())
+    }
+
     /// The label of a physical group; 0 is none.
     fn label(&mut self, group: i64) -> u32 {
         if let Some((known, label)) = self.last
@@ -148,10 +193,9 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         {
             return label;
         }
-        let label = match self.names.get(&group) {
-            _ if group == 0 => self.target.label(""),
-            Some(name) => self.target.label(name),
-            None => self.target.label(&group.to_string()),
+        let label = match group {
+            0 => self.target.label(""),
+            _ => self.target.label(&self.group_name(group)),
         };
         self.last = Some((group, label));
         label
@@ -176,6 +220,14 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         if role == Role::Thin {
             return Ok(());
         }
+        if let Some((last, of_last, known)) = &self.last_element
+            && (last.n_nodes, last.role, of_last) == (n_nodes, role, tags)
+            && *known != group
+        {
+            self.other_groups.insert(group);
+            return Ok(());
+        }
+        self.last_element = Some((kind, *tags, group));
         let mut corners = [0; 8];
         for (corner, tag) in corners.iter_mut().zip(&tags[..n_corners]) {
             *corner = self.nodes.find(*tag, &self.numbers.feed)?;
@@ -205,27 +257,51 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         self.numbers.check_count(what, declared, words, bytes)
     }
 
-    fn read_nodes_2(&mut self) -> Result<()> {
+    fn read_nodes_2(&mut self, is_parametric: bool, end: &'static str) -> Result<()> {
         let n = self.text_count("nodes", 4, 7)?;
         for i in 0..n {
             self.numbers.need_record("nodes", n, i)?;
             let tag = self.numbers.int()?;
             let p = self.point()?;
+            if is_parametric {
+                // Dimension and number of the entity, and a parameter or two.
+                let dimension = self.numbers.int()?;
+                self.numbers.int()?;
+                for _ in 0..if dimension < 3 { dimension } else { 0 } {
+                    self.numbers.double()?;
+                }
+            }
             self.node(tag, p)?;
         }
-        self.numbers.end("$EndNodes")
+        self.numbers.end(end)
     }
 
-    fn read_elements_2_text(&mut self) -> Result<()> {
+    fn read_elements_2_text(&mut self, end: &'static str) -> Result<()> {
         let n = self.text_count("elements", 4, 2)?;
         for i in 0..n {
             self.numbers.need_record("elements", n, i)?;
             self.numbers.int()?;
             let kind = self.numbers.int()?;
-            let n_tags = self.numbers.int()?;
-            self.read_element_2(kind, n_tags)?;
+            match self.version {
+                Version::V1 => {
+                    let group = self.numbers.int()?;
+                    self.numbers.int()?;
+                    let n_nodes = self.numbers.int()?;
+                    let known = need_element_type(kind, &self.numbers.feed)?;
+                    if usize::try_from(n_nodes) != Ok(known.n_nodes) {
+                        let found = n_nodes.to_string();
+                        let expected = format!("{} nodes", known.n_nodes);
+                        return Err(self.numbers.feed.unexpected(expected, found.as_bytes()));
+                    }
+                    self.read_corners(known, group)?;
+                }
+                _ => {
+                    let n_tags = self.numbers.int()?;
+                    self.read_element_2(kind, n_tags)?;
+                }
+            }
         }
-        self.numbers.end("$EndElements")
+        self.numbers.end(end)
     }
 
     fn read_elements_2_binary(&mut self) -> Result<()> {
@@ -263,6 +339,11 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             }
         }
         let kind = need_element_type(kind, &self.numbers.feed)?;
+        self.read_corners(kind, group)
+    }
+
+    /// The nodes of an element of versions 1 and 2.
+    fn read_corners(&mut self, kind: ElementType, group: i64) -> Result<()> {
         let mut tags = [0; 8];
         for i in 0..kind.n_nodes {
             let tag = self.numbers.int()?;
@@ -273,7 +354,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         self.element(kind, &tags, group)
     }
 
-    // --- 4.1 ----------------------------------------------------------------------------------
+    // --- 4.0 and 4.1 ----------------------------------------------------------------------------------
 
     fn read_entities(&mut self, partitioned: bool) -> Result<()> {
         let mut counts = [0; 4];
@@ -294,7 +375,8 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                     self.numbers.int()?;
                     self.int_list()?;
                 }
-                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                let is_point = dimension == 0 && self.version == Version::V41;
+                for _ in 0..if is_point { 3 } else { 6 } {
                     self.numbers.double()?;
                 }
                 let groups = self.int_list()?;
@@ -304,6 +386,9 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 };
                 if let (2.., Some(&group)) = (dimension, groups.first()) {
                     known.insert(entity, group.saturating_abs());
+                }
+                if dimension == 2 {
+                    self.other_groups.extend(groups.iter().skip(1).map(|g| g.saturating_abs()));
                 }
                 if dimension > 0 {
                     self.int_list()?;
@@ -322,20 +407,33 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         (0..n).map(|_| self.numbers.int()).collect()
     }
 
-    /// The four numbers before the blocks of a section: blocks, entries, lowest and highest tag.
+    /// The tag of a node or an element.
+    fn tag(&mut self) -> Result<i64> {
+        match self.version {
+            Version::V40 => self.numbers.int(),
+            _ => self.numbers.size(),
+        }
+    }
+
+    /// The numbers before the blocks of a section: blocks, entries, and since 4.1 lowest and highest tag.
     fn block_header(&mut self, what: &'static str, words: u64) -> Result<(u64, u64)> {
         let (n_blocks, n) = (self.numbers.size()?, self.numbers.size()?);
         let n_blocks = self.numbers.check_count("blocks", n_blocks, 4, 5)?;
         let n = self.numbers.check_count(what, n, words, 8)?;
-        self.numbers.size()?;
-        self.numbers.size()?;
+        if self.version == Version::V41 {
+            self.numbers.size()?;
+            self.numbers.size()?;
+        }
         Ok((n_blocks, n))
     }
 
     /// The numbers before one block: entity dimension, entity, a third and the number of entries.
     fn block(&mut self, what: &'static str, words: u64) -> Result<(i64, i64, i64, u64)> {
-        let (dimension, entity, third) =
+        let (mut dimension, mut entity, third) =
             (self.numbers.int()?, self.numbers.int()?, self.numbers.int()?);
+        if self.version == Version::V40 {
+            (dimension, entity) = (entity, dimension);
+        }
         let n = self.numbers.size()?;
         let n = self.numbers.check_count(what, n, words, 8)?;
         Ok((dimension, entity, third, n))
@@ -358,12 +456,17 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             let (dimension, _, parametric, n) = self.block("nodes", 4)?;
             let n_parameters = if parametric != 0 { dimension.clamp(0, 3) } else { 0 };
             tags.clear();
-            for k in 0..n {
+            // In 4.0 each tag stands before its coordinates.
+            for k in 0..if self.version == Version::V41 { n } else { 0 } {
                 self.numbers.need_record("nodes", n, k)?;
                 tags.push(self.numbers.size()?);
             }
-            for (k, &tag) in (0..).zip(&tags) {
+            for k in 0..n {
                 self.numbers.need_record("nodes", n, k)?;
+                let tag = match tags.get(k as usize) {
+                    Some(&tag) => tag,
+                    None => self.tag()?,
+                };
                 let p = self.point()?;
                 for _ in 0..n_parameters {
                     self.numbers.double()?;
@@ -392,10 +495,10 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             let is_inside = dimension == 2 && self.inside.contains(&entity);
             for k in 0..n {
                 self.numbers.need_record("elements", n, k)?;
-                self.numbers.size()?;
+                self.tag()?;
                 let mut tags = [0; 8];
                 for j in 0..kind.n_nodes {
-                    let tag = self.numbers.size()?;
+                    let tag = self.tag()?;
                     if let Some(slot) = tags.get_mut(j) {
                         *slot = tag;
                     }

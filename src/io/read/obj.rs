@@ -1,7 +1,7 @@
 //! Wavefront OBJ: `v` and `f` lines; groups, objects or materials as labels.
 //!
 //! A face names vertices from 1, or backwards from the last one as −1. Texture and normal numbers after slashes are skipped. A backslash
-//! continues a line.
+//! continues a line, `#` begins a comment; names of groups may have one.
 
 use std::io::BufRead;
 
@@ -99,8 +99,10 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     feed.finish(target.builder)
 }
 
+/// The words of a line before a comment.
 fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let all = line.split(u8::is_ascii_whitespace);
+    let text = line.split(|&b| b == b'#').next().unwrap_or_default();
+    let all = text.split(u8::is_ascii_whitespace);
     all.filter(|w| !w.is_empty())
 }
 

@@ -78,6 +78,8 @@ fn obj_good_and_bad() {
         Format::Obj,
         format!("vt 0 0\n{}{vertices}", faces.replace(" 3//7", " \\\n 3")),
     );
+    let noted = body.replace("//7\n", "//7 # x 9\n").replace("0\n", "0 # 7\n");
+    read_tetrahedron(Format::Obj, noted.replacen("f 1", "f 1# ", 0));
     let named = faces.replacen("f ", "o box\nusemtl red\nf ", 1).replacen("f 1", "g lid\nf 1", 1);
     let surface = read_tetrahedron(Format::Obj, format!("{vertices}{named}"));
     assert_eq!(
