@@ -277,6 +277,11 @@ impl SurfaceBuilder {
         self.file2vert.get(vertex as usize).copied()
     }
 
+    /// The position of a vertex of the current file.
+    pub fn position(&self, vertex: u32) -> Option<Point> {
+        Some(self.positions(&[vertex])?[0])
+    }
+
     /// Triangles of the current file so far, as vertices of the file.
     pub fn file_triangles(&self) -> impl Iterator<Item = &[u32; 3]> {
         self.surface.triangles[self.triangle_first..].iter()

@@ -145,9 +145,9 @@ pub fn read_background(
 
 /// Hash of a size file and of its mesh file, if it has one.
 fn hash(path: &Path) -> Result<String, Error> {
-    let (sizes, mesh) = size_files(path)?;
+    let (sizes, beside) = size_files(path)?;
     let mut all = Xxh3::new();
-    for file in [Some(sizes), mesh].into_iter().flatten() {
+    for file in std::iter::once(sizes).chain(beside) {
         for half in source(&file)?.hash {
             all.update(&half.to_le_bytes());
         }

@@ -11,7 +11,7 @@ const WORD_MAX: usize = 4096;
 /// Longest line accepted where lines matter; a polygon of a million corners still fits.
 const LINE_MAX: usize = 16 << 20;
 /// Wanted lengths are kept in single precision, which ends at 3e38; the rest is left for sums and squares.
-const COORDINATE_MAX: f64 = 1e30;
+pub(super) const COORDINATE_MAX: f64 = 1e30;
 
 /// Result of everything that reads.
 pub(super) type Result<T> = std::result::Result<T, ReadError>;
@@ -429,6 +429,18 @@ impl<R: BufRead> Feed<R> {
                 Err(self.truncated(format!("{N} more bytes")))
             }
             Err(e) => Err(broken(self.place(), &e)),
+        }
+    }
+
+    /// Takes all bytes left, at most `limit`.
+    pub fn rest(&mut self, limit: u64) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let read = (&mut self.reader).take(limit.saturating_add(1)).read_to_end(&mut bytes);
+        read.map_err(|e| broken(self.place(), &e))?;
+        let needed = bytes.len() as u64;
+        match needed > limit {
+            true => Err(self.refuse(ReadFault::TooLarge { what: "the file", needed, limit })),
+            false => Ok(bytes),
         }
     }
 

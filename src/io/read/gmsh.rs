@@ -31,6 +31,8 @@ struct GmshReader<'a, 'b, R> {
     last_element: Option<(ElementType, [i64; 8], i64)>,
     /// Surface groups with elements that another group has too.
     other_groups: BTreeSet<i64>,
+    /// Numbers at nodes by their tags, where they are wanted.
+    node_data: Option<HashMap<i64, f64>>,
     solids: Solids,
     n_curved: u64,
     /// Names and groups of volumes, as of surfaces.
@@ -47,29 +49,37 @@ enum Version {
     V41,
 }
 
-pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
-    feed.need_word("`$MeshFormat`")?;
-    let (version, binary, big) = match feed.word() {
-        b"$NOD" | b"$ELM" => (Version::V1, false, false),
-        b"$MeshFormat" => read_format(&mut feed)?,
-        word => return Err(feed.unexpected("`$MeshFormat`, or `$NOD` of version 1", word)),
-    };
-    let mut mesh = GmshReader {
-        numbers: GmshNumbers { feed, binary, big },
-        version,
-        target,
-        nodes: NodeTags::default(),
-        names: HashMap::new(),
-        groups: HashMap::new(),
-        inside: HashSet::new(),
-        last: None,
-        last_element: None,
-        other_groups: BTreeSet::new(),
-        solids: Solids::default(),
-        n_curved: 0,
-        volume_names: HashMap::new(),
-        volume_groups: HashMap::new(),
-    };
+impl<'a, 'b, R: BufRead> GmshReader<'a, 'b, R> {
+    /// Reads the head of a file.
+    fn open(mut feed: Feed<R>, target: &'a mut SurfaceSink<'b>) -> Result<Self> {
+        feed.need_word("`$MeshFormat`")?;
+        let (version, binary, big) = match feed.word() {
+            b"$NOD" | b"$ELM" => (Version::V1, false, false),
+            b"$MeshFormat" => read_format(&mut feed)?,
+            word => return Err(feed.unexpected("`$MeshFormat`, or `$NOD` of version 1", word)),
+        };
+        Ok(GmshReader {
+            numbers: GmshNumbers { feed, binary, big },
+            version,
+            target,
+            nodes: NodeTags::default(),
+            names: HashMap::new(),
+            groups: HashMap::new(),
+            inside: HashSet::new(),
+            last: None,
+            last_element: None,
+            other_groups: BTreeSet::new(),
+            node_data: None,
+            solids: Solids::default(),
+            n_curved: 0,
+            volume_names: HashMap::new(),
+            volume_groups: HashMap::new(),
+        })
+    }
+}
+
+pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
+    let mut mesh = GmshReader::open(feed, target)?;
     mesh.read_sections()?;
     if mesh.n_curved > 0 {
         mesh.target.builder.note(NoteKind::CurvedFaces { n: mesh.n_curved });
@@ -80,6 +90,43 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     }
     std::mem::take(&mut mesh.solids).finish("solid elements", mesh.target);
     mesh.numbers.feed.finish(mesh.target.builder)
+}
+
+/// Reads the tetrahedra of a file and the numbers of its first `$NodeData` at the nodes that have one: points, tetrahedra, numbers.
+pub(super) fn read_node_data<R: BufRead>(
+    feed: Feed<R>,
+    target: &mut SurfaceSink,
+) -> Result<(Vec<Point>, Vec<[u32; 4]>, Vec<f64>)> {
+    let mut mesh = GmshReader::open(feed, target)?;
+    mesh.node_data = Some(HashMap::new());
+    mesh.read_sections()?;
+    let data = mesh.node_data.take().unwrap_or_default();
+    let feed = &mesh.numbers.feed;
+    let mut at = HashMap::new();
+    for (&tag, &h) in &data {
+        at.insert(mesh.nodes.find(tag, feed)?, h);
+    }
+    let tets = mesh.solids.tets();
+    let (mut points, mut numbers, mut position) = (Vec::new(), Vec::new(), HashMap::new());
+    for v in 0..mesh.target.builder.n_file_vertices() as u32 {
+        if let (Some(&h), Some(p)) = (at.get(&v), mesh.target.builder.position(v)) {
+            position.insert(v, points.len() as u32);
+            points.push(p);
+            numbers.push(h);
+        }
+    }
+    let place = |t: [u32; 4]| {
+        let corners = t.map(|v| position.get(&v).copied());
+        match corners {
+            [Some(a), Some(b), Some(c), Some(d)] => Ok([a, b, c, d]),
+            _ => Err(feed.unexpected("a number at every node of the tetrahedra", b"fewer")),
+        }
+    };
+    let tets = tets.map(place).collect::<Result<Vec<_>>>()?;
+    match data.is_empty() {
+        true => Err(feed.unexpected("a section `$NodeData`", b"none")),
+        false => Ok((points, tets, numbers)),
+    }
 }
 
 /// The section `$MeshFormat`: the version, whether numbers are binary, and whether their high bytes come first.
@@ -143,6 +190,9 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                     }
                     self.read_entities(true)?;
                 }
+                (b"$NodeData", _) if self.node_data.as_ref().is_some_and(HashMap::is_empty) => {
+                    self.read_node_data()?;
+                }
                 (b"$NOD", V1) => self.read_nodes_2(false, "$ENDNOD")?,
                 (b"$ELM", V1) => self.read_elements_2_text("$ENDELM")?,
                 (b"$Nodes", V2) => self.read_nodes_2(false, "$EndNodes")?,
@@ -180,6 +230,41 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             }
         }
         self.numbers.end("$EndPhysicalNames")
+    }
+
+    /// Text in quotes, numbers and whole numbers, each with their count, then tags with numbers.
+    fn read_node_data(&mut self) -> Result<()> {
+        let n_texts = self.numbers.feed.count("texts", 1)?;
+        // A line for each, behind that of their number.
+        for _ in 0..=n_texts {
+            self.numbers.feed.skip_line()?;
+        }
+        for _ in 0..self.numbers.feed.count("numbers", 2)? {
+            self.numbers.feed.need_word("a number")?;
+        }
+        let mut counts = [0, 1, 0];
+        let n_counts = self.numbers.feed.count("whole numbers", 2)?;
+        for k in 0..n_counts {
+            let n = self.numbers.feed.integer("a whole number")?;
+            if let Some(count) = counts.get_mut(k as usize) {
+                *count = n;
+            }
+        }
+        if counts[1] != 1 {
+            return Err(self.numbers.feed.unsupported("node data that is not one number a node"));
+        }
+        if self.numbers.binary {
+            self.numbers.feed.skip_line()?;
+        }
+        let n = self.numbers.check_count("numbers at nodes", counts[2], 2, 6)?;
+        let mut data = HashMap::new();
+        for i in 0..n {
+            self.numbers.need_record("numbers at nodes", n, i)?;
+            let tag = self.numbers.int()?;
+            data.insert(tag, self.numbers.double()?);
+        }
+        self.node_data = Some(data);
+        self.numbers.end("$EndNodeData")
     }
 
     fn group_name(&self, group: i64) -> String {

@@ -1,4 +1,5 @@
-//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen; sizes at the vertices of MEDIT meshes; files of edges and points.
+//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen, VTK, Abaqus, Nastran, I-DEAS; sizes at the vertices of
+//! meshes; files of edges and points.
 //!
 //! A declared count is compared with the length of the file before it is used; every error
 //! has its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
@@ -9,6 +10,7 @@ mod embedded;
 mod embedded_sink;
 mod error;
 mod feed;
+mod fem;
 mod gmsh;
 mod gmsh_numbers;
 mod lengths;
@@ -25,6 +27,8 @@ mod solids;
 mod stl;
 mod tetgen;
 mod vtk;
+mod vtk_xml;
+mod xml;
 
 #[cfg(test)]
 mod collection;
@@ -68,6 +72,16 @@ pub enum Format {
     TetgenSmesh,
     /// TetGen `.poly`.
     TetgenPoly,
+    /// Legacy VTK, `.vtk`.
+    Vtk,
+    /// VTK's XML files, `.vtp` and `.vtu`.
+    VtkXml,
+    /// Abaqus, `.inp`.
+    Abaqus,
+    /// Nastran, `.nas` and `.bdf`.
+    Nastran,
+    /// I-DEAS universal file, `.unv`.
+    Unv,
 }
 
 impl Format {
@@ -85,6 +99,11 @@ impl Format {
             "msh" => Self::Gmsh,
             "smesh" => Self::TetgenSmesh,
             "poly" => Self::TetgenPoly,
+            "vtk" => Self::Vtk,
+            "inp" => Self::Abaqus,
+            "nas" | "bdf" => Self::Nastran,
+            "unv" => Self::Unv,
+            "vtp" | "vtu" => Self::VtkXml,
             _ => return None,
         })
     }
@@ -96,7 +115,9 @@ impl Format {
         };
         if starts("ply\n") || starts("ply\r") {
             Some(Self::Ply)
-        } else if starts("$MeshFormat") {
+        } else if starts("# vtk DataFile") {
+            Some(Self::Vtk)
+        } else if starts("$MeshFormat") || starts("$NOD") {
             Some(Self::Gmsh)
         } else if starts("MeshVersionFormatted") {
             Some(Self::Medit)
@@ -175,12 +196,12 @@ pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> 
         SurfaceSink { builder: &mut builder, stem: stem(Path::new(file)), prefix: None };
     target.builder.begin_file(file);
     let feed = Feed::new(file, bytes, bytes.len() as u64);
-    read_feed(format, feed, None, 0, &mut target)?;
+    read_feed(format, feed, None, bytes.len() as u64 * 16, &mut target)?;
     Ok(builder.finish())
 }
 
 const UNKNOWN_FORMAT: ReadFault = ReadFault::UnknownFormat(
-    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds, with .gz or .zst behind it where it is packed",
+    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh, .poly, .vtk, .vtp, .vtu, .inp, .nas, .bdf or .unv after what it holds, with .gz or .zst behind it where it is packed",
 );
 
 fn unique(stem: &str, taken: &[String]) -> String {
@@ -233,6 +254,11 @@ fn read_feed<R: BufRead>(
         Format::MeditBinary => medit::read(feed, true, target),
         Format::Gmsh => gmsh::read(feed, target),
         Format::TetgenSmesh => tetgen::read(feed, tetgen::FacetLayout::Smesh, nodes, limit, target),
+        Format::Vtk => vtk::read_surface(feed, target),
+        Format::Abaqus => fem::read_abaqus(feed, target),
+        Format::Nastran => fem::read_nastran(feed, target),
+        Format::Unv => fem::read_unv(feed, target),
+        Format::VtkXml => vtk_xml::read(feed, limit, target),
         Format::TetgenPoly => tetgen::read(feed, tetgen::FacetLayout::Poly, nodes, limit, target),
     }
 }

@@ -60,6 +60,11 @@ impl Solids {
         self.n
     }
 
+    /// The tetrahedra, as vertices of the file.
+    pub fn tets(&self) -> impl Iterator<Item = [u32; 4]> {
+        self.tets.iter().map(|(corners, _)| *corners)
+    }
+
     /// Notes that the elements are left out, and adds a seed for each connected part of them, where any has a name. Parts end at the
     /// triangles of the file. Call before the file ends.
     pub fn finish(self, what: &'static str, target: &mut SurfaceSink) {

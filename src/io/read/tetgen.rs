@@ -178,6 +178,17 @@ pub(super) fn read_nodes<R: BufRead>(feed: &mut Feed<R>, sink: &mut EmbeddedSink
     }
 }
 
+/// The number of the first point of a `.node` file, and all positions.
+pub(super) fn read_positions<R: BufRead>(mut feed: Feed<R>) -> Result<(i64, Vec<Point>)> {
+    feed.comment = Some(b'#');
+    let mut points = Vec::new();
+    let numbering = read_points(&mut feed, |p, _| {
+        points.push(p);
+        Ok(())
+    })?;
+    Ok((numbering.map_or(0, |numbering| numbering.first), points))
+}
+
 /// The facets of two corners in a `.poly` file, called by their markers.
 pub(super) fn read_segments<R: BufRead>(
     mut feed: Feed<R>,
