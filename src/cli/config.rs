@@ -82,7 +82,7 @@ fn seeds(path: &Path) -> Result<Vec<Seed>, Failure> {
         Code::UnreadableFile | Code::Memory => Failure::from(e),
         _ => Failure { code: Code::BadSeed, ..e.into() },
     };
-    Ok(read_seeds(path, BYTES_MAX).map_err(|e| bad(e.into()))?)
+    read_seeds(path, BYTES_MAX).map_err(|e| bad(e.into()))
 }
 
 /// Reads a text file. Errors: a pipe or a device, which may never end; a file too long for options.

@@ -11,7 +11,7 @@ const WORD_MAX: usize = 4096;
 /// Longest line accepted where lines matter; a polygon of a million corners still fits.
 const LINE_MAX: usize = 16 << 20;
 /// Wanted lengths are kept in single precision, which ends at 3e38; the rest is left for sums and squares.
-pub(super) const COORDINATE_MAX: f64 = 1e30;
+const COORDINATE_MAX: f64 = 1e30;
 
 /// Result of everything that reads.
 pub(super) type Result<T> = std::result::Result<T, ReadError>;
@@ -473,6 +473,15 @@ impl Position {
 /// The bytes at hand, none at the end of the file.
 fn fill<'b, R: BufRead>(reader: &'b mut R, at: &Position) -> Result<&'b [u8]> {
     reader.fill_buf().map_err(|e| broken(at.place(), &e))
+}
+
+/// The error of a coordinate that is not finite or too large to compute with.
+pub(super) fn check_point(p: Point, place: &FilePlace) -> Result<()> {
+    match p.to_array().into_iter().find(|x| !x.is_finite() || x.abs() >= COORDINATE_MAX) {
+        None => Ok(()),
+        Some(x) if x.is_finite() => Err(place.refuse(ReadFault::CoordinateRange(x))),
+        Some(x) => Err(not_a_number(place, "a coordinate", x.to_string().as_bytes())),
+    }
 }
 
 fn broken(place: FilePlace, error: &std::io::Error) -> ReadError {

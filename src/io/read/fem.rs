@@ -53,9 +53,7 @@ impl<'a, 'b> Elements<'a, 'b> {
             return Err(unexpected(place, "nodes of different numbers", tag.to_string()));
         }
         let p = Point::from_array(xyz);
-        if !(p.abs().max_element() < super::feed::COORDINATE_MAX) {
-            return Err(place.refuse(ReadFault::CoordinateRange(p.abs().max_element())));
-        }
+        super::feed::check_point(p, place)?;
         let added = self.target.builder.vertex(p);
         added.map_err(|source| place.refuse(ReadFault::Surface(source)))
     }

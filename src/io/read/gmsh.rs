@@ -92,11 +92,14 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Resul
     mesh.numbers.feed.finish(mesh.target.builder)
 }
 
-/// Reads the tetrahedra of a file and the numbers of its first `$NodeData` at the nodes that have one: points, tetrahedra, numbers.
+/// Points, tetrahedra between them, and a number at each point.
+pub(super) type NodeData = (Vec<Point>, Vec<[u32; 4]>, Vec<f64>);
+
+/// Reads the tetrahedra of a file and the numbers of its first `$NodeData` at the nodes that have one.
 pub(super) fn read_node_data<R: BufRead>(
     feed: Feed<R>,
     target: &mut SurfaceSink,
-) -> Result<(Vec<Point>, Vec<[u32; 4]>, Vec<f64>)> {
+) -> Result<NodeData> {
     let mut mesh = GmshReader::open(feed, target)?;
     mesh.node_data = Some(HashMap::new());
     mesh.read_sections()?;

@@ -47,7 +47,7 @@ fn read_array(path: &Path, columns: Option<u64>, limit: u64) -> Result<Vec<f64>>
             let expected = format!("a length from {LENGTH_MIN:e} to {:e}", 1.0 / LENGTH_MIN);
             return Err(file.unexpected(Spot::File, &expected, format!("{h} as number {i}")));
         }
-        if !(h.abs() < super::feed::COORDINATE_MAX) {
+        if !h.is_finite() {
             let found = format!("{h} as number {i}");
             return Err(file.unexpected(Spot::File, "a coordinate", found));
         }

@@ -9,10 +9,11 @@ use std::path::{Path, PathBuf};
 
 use super::error::{FilePlace, ReadFault};
 use super::feed::{Feed, Result};
+use super::gmsh::{self, NodeData};
 use super::lengths::read_rows;
 use super::medit_numbers::{MeditNumbers, SectionRead};
 use super::open::{open, open_plain};
-use super::{PointColumns, PointTable, SurfaceSink, gmsh, tetgen, vtk_xml};
+use super::{PointColumns, PointTable, SurfaceSink, tetgen, vtk_xml};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::SurfaceBuilder;
 
@@ -36,9 +37,7 @@ pub fn size_files(path: &Path) -> Result<(PathBuf, Vec<PathBuf>)> {
     match extension.to_ascii_lowercase().as_str() {
         "sol" => Ok((path.to_owned(), beside(["mesh", "meshb"]))),
         "solb" => Ok((path.to_owned(), beside(["meshb", "mesh"]))),
-        "csv" | "tsv" | "txt" | "dat" | "xyz" | "npy" | "msh" | "vtu" => {
-            Ok((path.to_owned(), Vec::new()))
-        }
+        "csv" | "tsv" | "npy" | "msh" | "vtu" => Ok((path.to_owned(), Vec::new())),
         "mtr" => {
             let files = ["node", "ele"].map(|e| path.with_extension(e));
             Ok((path.to_owned(), files.into_iter().filter(|p| p.is_file()).collect()))
@@ -48,7 +47,7 @@ pub fn size_files(path: &Path) -> Result<(PathBuf, Vec<PathBuf>)> {
             None => refuse(ReadFault::Alone(path.with_extension("sol").display().to_string())),
         },
         _ => refuse(ReadFault::UnknownFormat(
-            "sizes are read from .sol, .solb or .mtr, with their mesh beside them, from .csv, .txt and .npy of x, y, z and a length, from .msh with $NodeData and from .vtu",
+            "sizes are read from .sol, .solb or .mtr, with their mesh beside them, from .csv, .tsv and .npy of x, y, z and a length, from .msh with $NodeData and from .vtu",
         )),
     }
 }
@@ -118,8 +117,10 @@ fn read_foreign(path: &Path, extension: &str, beside: &[PathBuf], limit: u64) ->
         }
         "vtu" => read_vtu(path, limit)?,
         "mtr" => match read_mtr(path, beside, limit)? {
-            (None, _, h) => return check_sizes(&whole, &h).map(|()| FileSizes::AtVertices(h)),
-            (Some(points), tets, h) => (points, tets, h),
+            (false, (_, _, h)) => {
+                return check_sizes(&whole, &h).map(|()| FileSizes::AtVertices(h));
+            }
+            (true, data) => data,
         },
         _ => {
             let (mut points, mut h) = (Vec::new(), Vec::new());
@@ -168,10 +169,8 @@ fn check_sizes(place: &FilePlace, h: &[f64]) -> Result<()> {
     }
 }
 
-type Background = (Vec<Point>, Vec<[u32; 4]>, Vec<f64>);
-
 /// The one array of single numbers at points, or that called `h` or `size`, with the tetrahedra of a grid.
-fn read_vtu(path: &Path, limit: u64) -> Result<Background> {
+fn read_vtu(path: &Path, limit: u64) -> Result<NodeData> {
     let place = FilePlace::new(path);
     let (mut points, mut tets, mut h) = (Vec::new(), Vec::new(), Vec::new());
     for piece in vtk_xml::pieces(open(path, limit)?, limit)? {
@@ -210,12 +209,9 @@ fn read_vtu(path: &Path, limit: u64) -> Result<Background> {
     Ok((points, tets, h))
 }
 
-/// The numbers of a `.mtr` file with the points and tetrahedra of the files beside it. Without points they are for the surface's own.
-fn read_mtr(
-    path: &Path,
-    beside: &[PathBuf],
-    limit: u64,
-) -> Result<(Option<Vec<Point>>, Vec<[u32; 4]>, Vec<f64>)> {
+/// The numbers of a `.mtr` file with the points and tetrahedra of the files beside it. False
+/// if there are no points: then they are for the surface's own vertices.
+fn read_mtr(path: &Path, beside: &[PathBuf], limit: u64) -> Result<(bool, NodeData)> {
     let mut feed = open(path, limit)?;
     feed.comment = Some(b'#');
     let n = feed.count("sizes", 2)?;
@@ -231,7 +227,7 @@ fn read_mtr(
     let of =
         |extension: &str| beside.iter().find(|p| p.extension().is_some_and(|e| e == extension));
     let Some(nodes) = of("node") else {
-        return Ok((None, Vec::new(), h));
+        return Ok((false, (Vec::new(), Vec::new(), h)));
     };
     let (first, points) = tetgen::read_positions(open(nodes, limit)?)?;
     let mut tets = Vec::new();
@@ -251,7 +247,7 @@ fn read_mtr(
             feed.skip_line()?;
         }
     }
-    Ok((Some(points), tets, h))
+    Ok((true, (points, tets, h)))
 }
 
 fn open_medit(path: &Path) -> Result<MeditNumbers<BufReader<File>>> {
@@ -473,7 +469,7 @@ mod tests {
         let tet = vec![[0, 1, 2, 3]];
         for (path, expected) in [
             (write("a.csv", rows(",").as_bytes()), vec![]),
-            (write("b.txt", format!("# z h\nx y z h\n{}", rows(" ")).as_bytes()), vec![]),
+            (write("b.tsv", format!("# z h\nx y z h\n{}", rows(" ")).as_bytes()), vec![]),
             (
                 write(
                     "c.csv",

@@ -4,7 +4,7 @@
 
 use std::io::{BufRead, Read};
 
-use super::feed::{Feed, quote};
+use super::feed::{Feed, check_point, quote};
 use super::vtk::{CellCounts, Shape, shape};
 use super::xml::Tag;
 use super::{FilePlace, ReadFault, Result, Spot, SurfaceSink};
@@ -300,9 +300,7 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, limit: u64, target: &mut SurfaceSi
     let (mut first, mut cells_of) = (0, CellCounts::default());
     for piece in pieces(feed, limit)? {
         for p in piece.points() {
-            if !(p.abs().max_element() < super::feed::COORDINATE_MAX) {
-                return Err(place.refuse(ReadFault::CoordinateRange(p.abs().max_element())));
-            }
+            check_point(p, &place)?;
             target.builder.vertex(p).map_err(refuse)?;
         }
         let mut shapes: Vec<(Vec<u32>, Option<Shape>)> = Vec::new();

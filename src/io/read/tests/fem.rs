@@ -100,7 +100,7 @@ fn universal_files() {
         text,
         &[
             (" 10 40 30\n", " 10 40 31\n", "unexpected-text", 20),
-            ("2 91 1 1 7 3", "2 99 1 1 7 3", "unsupported-content", 21),
+            ("2 91 1 1 7 3", "2 99 1 1 7 3", "unsupported-content", 20),
             (" 0.0 1.0 0.0", " 0.0 1.0", "unexpected-text", 12),
             ("    -1\n   164", "   164", "unexpected-text", 1),
         ],
