@@ -176,38 +176,7 @@ fn cut(
             }
         }
     }
-    // Outside is what is reached from beyond the hull without crossing an edge of a polygon.
-    let mut is_out = vec![false; mesh.num_all_faces()];
-    let mut spread = |mut reached: Vec<FixedFaceHandle<PossiblyOuterTag>>| {
-        reached.iter().for_each(|face| is_out[face.index()] = true);
-        while let Some(face) = reached.pop() {
-            let edges: Vec<_> = match mesh.face(face).as_inner() {
-                Some(inner) => inner.adjacent_edges().to_vec(),
-                None => mesh.convex_hull().map(|edge| edge.rev()).collect(),
-            };
-            for edge in edges.iter().filter(|e| !e.is_constraint_edge()) {
-                for next in [edge.face(), edge.rev().face()] {
-                    if !is_out[next.index()] {
-                        is_out[next.index()] = true;
-                        reached.push(next.fix());
-                    }
-                }
-            }
-        }
-    };
-    spread(vec![mesh.outer_face().fix()]);
-    for &hole in holes {
-        let face = match mesh.locate(at(hole)) {
-            PositionInTriangulation::OnFace(face) => mesh.face(face).adjacent_edges()[0].face(),
-            PositionInTriangulation::OnEdge(edge)
-                if !mesh.is_constraint_edge(edge.as_undirected()) =>
-            {
-                mesh.directed_edge(edge).face()
-            }
-            _ => return Err(HOLE),
-        };
-        spread(vec![face.fix()]);
-    }
+    let is_out = outer_faces(&mesh, holes.iter().map(|p| at(*p)))?;
     let mut triangles: Triangles = (mesh.inner_faces())
         .filter(|face| !is_out[face.index()])
         .map(|face| {
@@ -227,6 +196,45 @@ fn cut(
         n if is_simple && n + 2 != points.len() => Err(CROSSED),
         _ => Ok(triangles),
     }
+}
+
+/// For each face whether it is outside, or in a hole: reached from there without crossing an edge of a polygon.
+fn outer_faces(
+    mesh: &ConstrainedDelaunayTriangulation<Point2<f64>>,
+    holes: impl Iterator<Item = Point2<f64>>,
+) -> Result<Vec<bool>, Uncut> {
+    let mut is_out = vec![false; mesh.num_all_faces()];
+    let mut spread = |mut reached: Vec<FixedFaceHandle<PossiblyOuterTag>>| {
+        reached.iter().for_each(|face| is_out[face.index()] = true);
+        while let Some(face) = reached.pop() {
+            let edges: Vec<_> = match mesh.face(face).as_inner() {
+                Some(inner) => inner.adjacent_edges().to_vec(),
+                None => mesh.convex_hull().map(|edge| edge.rev()).collect(),
+            };
+            for edge in edges.iter().filter(|e| !e.is_constraint_edge()) {
+                for next in [edge.face(), edge.rev().face()] {
+                    if !is_out[next.index()] {
+                        is_out[next.index()] = true;
+                        reached.push(next.fix());
+                    }
+                }
+            }
+        }
+    };
+    spread(vec![mesh.outer_face().fix()]);
+    for hole in holes {
+        let face = match mesh.locate(hole) {
+            PositionInTriangulation::OnFace(face) => mesh.face(face).adjacent_edges()[0].face(),
+            PositionInTriangulation::OnEdge(edge)
+                if !mesh.is_constraint_edge(edge.as_undirected()) =>
+            {
+                mesh.directed_edge(edge).face()
+            }
+            _ => return Err(HOLE),
+        };
+        spread(vec![face.fix()]);
+    }
+    Ok(is_out)
 }
 
 #[cfg(test)]

@@ -89,6 +89,46 @@ impl<'a, 'b> Elements<'a, 'b> {
         added.map_err(|source| place.refuse(ReadFault::Surface(source)))
     }
 
+    /// An element of Abaqus: its number and its nodes.
+    fn abaqus_element(
+        &mut self,
+        text: &str,
+        kind: &str,
+        set: &str,
+        place: &FilePlace,
+    ) -> Result<()> {
+        let words = text.split(',').filter(|w| !w.trim().is_empty());
+        let tags = words.map(|w| whole(w, place)).collect::<Result<Vec<i64>>>()?;
+        let (id, tags) = tags.split_first().ok_or_else(|| unexpected(place, "an element", text))?;
+        let is = |prefixes: &[&str]| prefixes.iter().any(|p| kind.starts_with(p));
+        let n = tags.len();
+        if is(&["C3D", "DC3D", "AC3D"]) {
+            let corners = match n {
+                4 | 10 => 4,
+                5 | 13 => 5,
+                6 | 15 => 6,
+                8 | 20 | 27 => 8,
+                _ => return Err(unexpected(place, "a solid element of that type", kind)),
+            };
+            self.solid(&tags[..corners], set, place)?;
+        } else if is(&[
+            "T2D", "T3D", "B2", "B3", "PIPE", "CONN", "SPRING", "MASS", "ROTARY", "DASH", "GAP",
+            "R2D", "RB",
+        ]) {
+            self.n_thin += 1;
+        } else if is(&["S", "DS", "R3D", "M3D", "CPS", "CPE", "F3D"]) {
+            let corners = match n {
+                3 | 6 | 7 => 3,
+                4 | 8 | 9 => 4,
+                _ => return Err(unexpected(place, "3, 4, 6, 8 or 9 nodes", text)),
+            };
+            self.face(*id, &tags[..corners], n, set.to_owned(), place);
+        } else {
+            return Err(unsupported(place, format!("the element type {}", quote(kind.as_bytes()))));
+        }
+        Ok(())
+    }
+
     fn finish<R: BufRead>(self, feed: &Feed<R>) -> Result<()> {
         if self.n_thin > 0 {
             let what = "beams and points";
@@ -193,39 +233,7 @@ pub(super) fn read_abaqus<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSin
                     };
                     text += &more;
                 }
-                let words = text.split(',').filter(|w| !w.trim().is_empty());
-                let tags = words.map(|w| whole(w, &place)).collect::<Result<Vec<i64>>>()?;
-                let (id, tags) =
-                    tags.split_first().ok_or_else(|| unexpected(&place, "an element", &text))?;
-                let is = |prefixes: &[&str]| prefixes.iter().any(|p| kind.starts_with(p));
-                let n = tags.len();
-                if is(&["C3D", "DC3D", "AC3D"]) {
-                    let corners = match n {
-                        4 | 10 => 4,
-                        5 | 13 => 5,
-                        6 | 15 => 6,
-                        8 | 20 | 27 => 8,
-                        _ => return Err(unexpected(&place, "a solid element of that type", &kind)),
-                    };
-                    mesh.solid(&tags[..corners], &set, &place)?;
-                } else if is(&[
-                    "T2D", "T3D", "B2", "B3", "PIPE", "CONN", "SPRING", "MASS", "ROTARY", "DASH",
-                    "GAP", "R2D", "RB",
-                ]) {
-                    mesh.n_thin += 1;
-                } else if is(&["S", "DS", "R3D", "M3D", "CPS", "CPE", "F3D"]) {
-                    let corners = match n {
-                        3 | 6 | 7 => 3,
-                        4 | 8 | 9 => 4,
-                        _ => return Err(unexpected(&place, "3, 4, 6, 8 or 9 nodes", &text)),
-                    };
-                    mesh.face(*id, &tags[..corners], n, set.clone(), &place);
-                } else {
-                    return Err(unsupported(
-                        &place,
-                        format!("the element type {}", quote(kind.as_bytes())),
-                    ));
-                }
+                mesh.abaqus_element(&text, &kind, &set, &place)?;
             }
             _ => {}
         }
@@ -330,9 +338,6 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
     let mut mesh = Elements::new(target);
     let mut groups: HashMap<i64, String> = HashMap::new();
     let mut solids = Vec::new();
-    let numbers = |text: &str, place: &FilePlace| -> Result<Vec<i64>> {
-        text.split_whitespace().map(|w| whole(w, place)).collect()
-    };
     while let Some((mark, place)) = line(&mut feed, "\0")? {
         if mark.trim() != "-1" {
             return Err(unexpected(&place, "-1 before a data set", mark));
@@ -364,45 +369,7 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
                 }
             }
             "2412" => {
-                while let Some((head, place)) = rows.next() {
-                    let [id, kind, .., n] = numbers(&head, &place)?[..] else {
-                        return Err(unexpected(&place, "the head of an element", head));
-                    };
-                    if matches!(kind, 21..=24) {
-                        rows.next();
-                    }
-                    let mut tags = Vec::new();
-                    while (tags.len() as i64) < n {
-                        let Some((row, place)) = rows.next() else {
-                            return Err(unexpected(
-                                &place,
-                                "the nodes of the element",
-                                "the end of the data set",
-                            ));
-                        };
-                        tags.extend(numbers(&row, &place)?);
-                    }
-                    // The nodes of a curved face run around it: every second one is a corner.
-                    let corners =
-                        |step: usize| tags.iter().copied().step_by(step).collect::<Vec<i64>>();
-                    match (kind, tags.len()) {
-                        (41 | 51 | 61 | 71 | 74 | 81 | 91, 3) | (44 | 54 | 64 | 84 | 94, 4) => {
-                            mesh.face(id, &tags, tags.len(), String::new(), &place);
-                        }
-                        (42 | 52 | 62 | 72 | 82 | 92, 6) | (45 | 55 | 65 | 75 | 85 | 95, 8) => {
-                            mesh.face(id, &corners(2), tags.len(), String::new(), &place);
-                        }
-                        (111, 4) | (112, 6) | (115, 8) => solids.push((id, tags, place)),
-                        (118, 10) => {
-                            solids.push((id, vec![tags[0], tags[2], tags[4], tags[9]], place))
-                        }
-                        (11 | 21..=24 | 31 | 32 | 121..=171, _) => mesh.n_thin += 1,
-                        _ => {
-                            let what = format!("element type {kind} of {} nodes", tags.len());
-                            return Err(unsupported(&place, what));
-                        }
-                    }
-                }
+                unv_elements(&mut mesh, rows, &mut solids)?;
             }
             "2467" | "2477" | "2452" | "2435" | "2432" | "2430" => {
                 while let (Some((head, place)), Some((title, _))) = (rows.next(), rows.next()) {
@@ -442,4 +409,56 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
         mesh.solid(&tags, groups.get(&id).map_or("", String::as_str), &place)?;
     }
     mesh.finish(&feed)
+}
+
+fn numbers(text: &str, place: &FilePlace) -> Result<Vec<i64>> {
+    text.split_whitespace().map(|w| whole(w, place)).collect()
+}
+
+/// A line of a file and its place.
+type Row = (String, FilePlace);
+
+/// The elements of data set 2412; solid ones go to `solids`.
+fn unv_elements(
+    mesh: &mut Elements,
+    mut rows: impl Iterator<Item = Row>,
+    solids: &mut Vec<(i64, Vec<i64>, FilePlace)>,
+) -> Result<()> {
+    while let Some((head, place)) = rows.next() {
+        let [id, kind, .., n] = numbers(&head, &place)?[..] else {
+            return Err(unexpected(&place, "the head of an element", head));
+        };
+        if matches!(kind, 21..=24) {
+            rows.next();
+        }
+        let mut tags = Vec::new();
+        while (tags.len() as i64) < n {
+            let Some((row, place)) = rows.next() else {
+                return Err(unexpected(
+                    &place,
+                    "the nodes of the element",
+                    "the end of the data set",
+                ));
+            };
+            tags.extend(numbers(&row, &place)?);
+        }
+        // The nodes of a curved face run around it: every second one is a corner.
+        let corners = |step: usize| tags.iter().copied().step_by(step).collect::<Vec<i64>>();
+        match (kind, tags.len()) {
+            (41 | 51 | 61 | 71 | 74 | 81 | 91, 3) | (44 | 54 | 64 | 84 | 94, 4) => {
+                mesh.face(id, &tags, tags.len(), String::new(), &place);
+            }
+            (42 | 52 | 62 | 72 | 82 | 92, 6) | (45 | 55 | 65 | 75 | 85 | 95, 8) => {
+                mesh.face(id, &corners(2), tags.len(), String::new(), &place);
+            }
+            (111, 4) | (112, 6) | (115, 8) => solids.push((id, tags, place)),
+            (118, 10) => solids.push((id, vec![tags[0], tags[2], tags[4], tags[9]], place)),
+            (11 | 21..=24 | 31 | 32 | 121..=171, _) => mesh.n_thin += 1,
+            _ => {
+                let what = format!("element type {kind} of {} nodes", tags.len());
+                return Err(unsupported(&place, what));
+            }
+        }
+    }
+    Ok(())
 }

@@ -13,6 +13,7 @@ mod feed;
 mod fem;
 mod gmsh;
 mod gmsh_numbers;
+mod gmsh_old;
 mod lengths;
 mod medit;
 mod medit_numbers;
@@ -28,6 +29,7 @@ mod stl;
 mod tetgen;
 mod vtk;
 mod vtk_xml;
+mod words;
 mod xml;
 
 #[cfg(test)]
@@ -44,7 +46,7 @@ pub use error::{FilePlace, ReadError, ReadFault, Spot};
 use feed::{Feed, Result};
 pub use lengths::read_lengths;
 pub use open::is_stream;
-use open::{open, stem, unpacked_name};
+use open::{is_binary_stl, open, stem, unpacked_name};
 pub use point_table::{PointColumns, PointRow, PointTable};
 use sink::SurfaceSink;
 pub use sizes::{FileSizes, read_sizes, size_files};
@@ -131,13 +133,6 @@ impl Format {
             None
         }
     }
-}
-
-/// Returns whether a length is that of a binary STL with this head.
-fn is_binary_stl(head: &[u8], length: u64) -> bool {
-    head.get(80..84)
-        .and_then(|count| count.try_into().ok())
-        .is_some_and(|count| length == 84 + 50 * u64::from(u32::from_le_bytes(count)))
 }
 
 /// The kind of solid model, for files without triangles.

@@ -75,7 +75,7 @@ pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
     let head = reader.fill_buf().map_err(|e| unreadable(path, e))?;
     let head = &head[..head.len().min(HEAD_BYTES)];
     let name = path.to_string_lossy();
-    let is_plain = super::is_binary_stl(head, length);
+    let is_plain = is_binary_stl(head, length);
     let has_mark = head.starts_with(b"\xef\xbb\xbf");
     let from_bytes = match utf16(head) {
         Some(order) if !is_plain => Some(order),
@@ -184,4 +184,11 @@ pub(super) fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
 
 fn unreadable(path: &Path, reason: impl ToString) -> ReadError {
     FilePlace::new(path).refuse(ReadFault::Unreadable(reason.to_string()))
+}
+
+/// Returns whether a length is that of a binary STL with this head.
+pub(super) fn is_binary_stl(head: &[u8], length: u64) -> bool {
+    head.get(80..84)
+        .and_then(|count| count.try_into().ok())
+        .is_some_and(|count| length == 84 + 50 * u64::from(u32::from_le_bytes(count)))
 }

@@ -150,6 +150,29 @@ impl Layout<'_> {
         Some(content)
     }
 
+    /// The numbers of an array whose tag is followed by `text`.
+    fn array(&self, tag: &Tag, text: &[u8]) -> Option<Vec<f64>> {
+        let format = tag.get("format").unwrap_or("ascii");
+        let mut bytes = match (format, self.appended) {
+            ("ascii", _) => {
+                let text = text.split(|&b| b == b'<').next()?;
+                let words = text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+                return words.map(super::feed::parse).collect();
+            }
+            ("appended", Some((data, is_base64))) => {
+                let text = data.get(tag.get("offset")?.parse::<usize>().ok()?..)?;
+                match is_base64 {
+                    true => Bytes::Base64 { text, ready: Vec::new() },
+                    false => Bytes::Raw(text),
+                }
+            }
+            ("binary", _) => Bytes::Base64 { text, ready: Vec::new() },
+            _ => return None,
+        };
+        let content = self.content(&mut bytes)?;
+        self.numbers(tag.get("type").unwrap_or_default(), &content)
+    }
+
     fn numbers(&self, kind: &str, content: &[u8]) -> Option<Vec<f64>> {
         macro_rules! numbers {
             ($type:ty) => {
@@ -236,39 +259,11 @@ pub(super) fn pieces<R: BufRead>(mut feed: Feed<R>, limit: u64) -> Result<Vec<Pi
             ("Piece", false) => pieces.push(Piece::default()),
             ("DataArray", false) => {
                 let kind = tag.get("type").unwrap_or_default();
-                let bad = || expected(at, "the numbers of an array");
-                let values = match tag.get("format").unwrap_or("ascii") {
-                    _ if kind == "String" => continue,
-                    "ascii" => {
-                        let end = tags[at..]
-                            .iter()
-                            .position(|&b| b == b'<')
-                            .map_or(tags.len(), |k| at + k);
-                        let words =
-                            tags[at..end].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
-                        words
-                            .map(super::feed::parse)
-                            .collect::<Option<Vec<f64>>>()
-                            .ok_or_else(bad)?
-                    }
-                    format => {
-                        let mut bytes = match (format, layout.appended) {
-                            ("appended", Some((data, is_base64))) => {
-                                let offset =
-                                    tag.get("offset").and_then(|o| o.parse::<usize>().ok());
-                                let data = offset.and_then(|o| data.get(o..)).ok_or_else(bad)?;
-                                match is_base64 {
-                                    true => Bytes::Base64 { text: data, ready: Vec::new() },
-                                    false => Bytes::Raw(data),
-                                }
-                            }
-                            ("binary", _) => Bytes::Base64 { text: &tags[at..], ready: Vec::new() },
-                            _ => return Err(bad()),
-                        };
-                        let content = layout.content(&mut bytes).ok_or_else(bad)?;
-                        layout.numbers(kind, &content).ok_or_else(bad)?
-                    }
-                };
+                if kind == "String" {
+                    continue;
+                }
+                let values = layout.array(&tag, &tags[at..]);
+                let values = values.ok_or_else(|| expected(at, "the numbers of an array"))?;
                 if let (Some(piece), Some(&section)) = (pieces.last_mut(), sections.last()) {
                     piece.arrays.push(Array {
                         section: str::to_owned(section),
