@@ -1,7 +1,8 @@
 //! Options of a mesh, from the command line and from a file of options.
 
 use std::path::Path;
-use tetdb_engine::api::{Code, MeshOptions, OptionsText, Seed, SeedKind, Word, typed};
+use tetdb_engine::api::error::Error;
+use tetdb_engine::api::{Code, MeshOptions, OptionsText, Seed, SeedKind, Word, read_seeds, typed};
 
 use super::args::{ShapeArgs, SizeArgs};
 use super::failure::Failure;
@@ -77,24 +78,11 @@ fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
 
 /// Reads a file of seeds. Errors: the line.
 fn seeds(path: &Path) -> Result<Vec<Seed>, Failure> {
-    let text = text(path).map_err(|e| {
-        Failure::new(Code::UnreadableFile, format!("the file cannot be read: {e}"))
-            .at(path.display())
-            .help("seeds are in a regular file, a line for each")
-    })?;
-    let mut seeds = Vec::new();
-    for (number, line) in (1..).zip(text.lines()) {
-        let line = line.split('#').next().unwrap_or_default().trim();
-        if line.is_empty() {
-            continue;
-        }
-        seeds.push(Seed::parse_line(line).ok_or_else(|| {
-            Failure::new(Code::BadSeed, format!("`{line}` is no seed"))
-                .at(format!("{}, line {number}", path.display()))
-                .help("a line is `x y z name`, `x y z` or `x y z hole`")
-        })?);
-    }
-    Ok(seeds)
+    let bad = |e: Error| match e.code() {
+        Code::UnreadableFile | Code::Memory => Failure::from(e),
+        _ => Failure { code: Code::BadSeed, ..e.into() },
+    };
+    read_seeds(path, BYTES_MAX).map_err(|e| bad(e.into()))
 }
 
 /// Reads a text file. Errors: a pipe or a device, which may never end; a file too long for options.

@@ -64,6 +64,7 @@ pub fn load_with(
     if divides {
         surface = surface.dividing();
     }
+    surface = surface.own_edges_with(settings)?;
     let edges = sheets.embed_edges.iter().map(|file| (file, EmbeddedKind::Edges));
     let points = sheets.embed_points.iter().map(|file| (file, EmbeddedKind::Points));
     for (file, kind) in edges.chain(points) {

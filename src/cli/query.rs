@@ -1,24 +1,19 @@
 //! The command `query`: tetrahedra by position, number, neighborhood or condition.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read, stdin};
-use std::path::Path;
-
 use super::args::QueryArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::query_ask::{bad, point, query};
 use super::query_rows::{Sink, Writer};
+use tetdb_engine::api::error::Error;
 use tetdb_engine::api::{
-    AnswerColumn, AnswerFile, AnswerRow, Code, Order, Settings, Store, VARIABLES, check_target,
-    inputs_of,
+    AnswerColumn, AnswerFile, AnswerRow, Order, PointColumns, PointTable, Settings, Store,
+    VARIABLES, check_target, inputs_of,
 };
 
 /// Memory for one point while it is answered, in bytes.
 const POINT_BYTES: u64 = 512;
-/// Largest length of a line with a point.
-const LINE_MAX: u64 = 4096;
 /// Position of excess among the variables.
 const EXCESS: usize = VARIABLES.len() - 1;
 /// Largest number of points answered together.
@@ -37,7 +32,7 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
         true => select(args, &mut store, (columns, order), &settings, console)?,
         false => {
             let mut writer = writer(args, columns, &settings, console)?;
-            let n = locate(args, &mut store, settings.cap()? / 8, &mut writer)?;
+            let n = locate(args, &mut store, settings.cap()? / 8, &mut writer, console)?;
             end(writer, console)?;
             n
         }
@@ -173,6 +168,7 @@ fn locate(
     store: &mut Store,
     memory: u64,
     writer: &mut Writer,
+    console: &Console,
 ) -> Result<u64, Failure> {
     let block = (memory / POINT_BYTES).clamp(1, POINTS_MAX) as usize;
     let mut points = Vec::new();
@@ -192,72 +188,19 @@ fn locate(
         Ok(true)
     };
     if let Some(path) = &args.points {
-        let mut from = opened(path)?;
-        for number in 1u64.. {
-            let Some(line) = line(&mut from).map_err(|e| unreadable(path, &e))? else {
-                break;
-            };
-            points.extend(parse_line(path, number, &line)?);
+        let mut is_named = false;
+        for row in PointTable::open(path, PointColumns::Named, memory).map_err(Error::from)? {
+            let row = row.map_err(Error::from)?;
+            is_named |= !row.name.is_empty();
+            points.push([0, 1, 2].map(|axis| row.numbers[axis]));
             if points.len() >= block && !answer(&mut points, writer)? {
                 return Ok(n);
             }
         }
+        if is_named {
+            console.note("note: points are answered in their order, without their names");
+        }
     }
     answer(&mut points, writer)?;
     Ok(n)
-}
-
-fn opened(path: &Path) -> Result<Box<dyn BufRead>, Failure> {
-    if path == Path::new("-") {
-        return Ok(Box::new(stdin().lock()));
-    }
-    let file = File::open(path).map_err(|e| unreadable(path, &e))?;
-    Ok(Box::new(BufReader::new(file)))
-}
-
-/// Reads the next line; `None` at the end. Errors: a line too long for three numbers, as from an endless device.
-fn line(from: &mut dyn BufRead) -> std::io::Result<Option<String>> {
-    let mut line = String::new();
-    let n = from.take(LINE_MAX).read_line(&mut line)?;
-    if n as u64 == LINE_MAX && !line.ends_with('\n') {
-        let why = format!("a line is longer than {LINE_MAX} bytes");
-        return Err(std::io::Error::other(why));
-    }
-    Ok((n > 0).then_some(line))
-}
-
-fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new(Code::UnreadableFile, format!("the points cannot be read: {error}"))
-        .at(path.display())
-        .help("check the path and its permissions")
-}
-
-/// Parses three numbers separated by commas or spaces. Empty lines and text after `#` are skipped.
-fn parse_line(path: &Path, number: u64, line: &str) -> Result<Option<[f64; 3]>, Failure> {
-    let text = line.split('#').next().unwrap_or_default().trim();
-    if text.is_empty() {
-        return Ok(None);
-    }
-    let words: Vec<&str> = text
-        .split(|c: char| c == ',' || c.is_whitespace())
-        .filter(|word| !word.is_empty())
-        .collect();
-    let fault = |code, message: String| {
-        Failure::new(code, message)
-            .at(format!("{}, line {number}", path.display()))
-            .help("write a point a line: 0.1,0.2,0.3 or 0.1 0.2 0.3")
-    };
-    let mut point = [0.0; 3];
-    if words.len() != 3 {
-        let message = format!("expected three coordinates, found {}", words.len());
-        return Err(fault(Code::UnexpectedText, message));
-    }
-    for (x, word) in point.iter_mut().zip(&words) {
-        *x = word.parse().unwrap_or(f64::NAN);
-        if !x.is_finite() {
-            let message = format!("{word} is not a finite number");
-            return Err(fault(Code::NotANumber, message));
-        }
-    }
-    Ok(Some(point))
 }

@@ -14,6 +14,7 @@ mod odd_inputs;
 mod people;
 mod pieces;
 mod place;
+mod point_files;
 mod query;
 mod refined;
 mod regions;

@@ -74,7 +74,7 @@ fn all_tetrahedra_add_up_to_the_mesh() {
 #[test]
 fn points_are_answered_in_their_order_from_anywhere() {
     let place = small();
-    place.write("probes.txt", "# three\n0.51, 0.52, 0.53\n\n7 7 7\t# outside\n0.1 0.2,0.3\n");
+    place.write("probes.txt", "# three\n0.51, 0.52, 0.53\n\n7 7 7\t# outside\n0.1 0.2 0.3\n");
     let line = "query a.tetdb --points probes.txt --json";
     let from_file = objects(&place.run_line(line).succeeds());
     assert_eq!(from_file.len(), 3);

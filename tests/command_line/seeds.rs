@@ -27,6 +27,11 @@ fn regions(place: &Place, store: &str) -> Vec<(Option<String>, bool)> {
         .collect()
 }
 
+fn tets(place: &Place, store: &str) -> u64 {
+    let info = place.run_line(&format!("info {store} --json")).succeeds().json();
+    info["tets"].as_u64().expect("a number")
+}
+
 #[test]
 fn seeds_fill_and_name_regions_and_names_are_good_wherever_regions_are() {
     let place = Place::new();
@@ -73,8 +78,8 @@ fn names_go_into_every_export_that_has_names_and_come_back_from_there() {
     let zones = place.path("case.foam").with_file_name("constant/polyMesh/cellZones");
     let zones = std::fs::read(zones).expect("it was written");
     assert!(zones.windows(6).any(|w| w == b"mantle"));
-    for file in ["s.msh", "s22.msh"] {
-        let line = format!("mesh {file} -o again.tetdb --regions seeds --force");
+    for (file, rule) in [("s.msh", ""), ("s22.msh", ""), ("s22.msh", "--regions seeds")] {
+        let line = format!("mesh {file} -o again.tetdb --force {rule}");
         place.run_line(&line).succeeds();
         let names: Vec<_> = regions(&place, "again.tetdb").into_iter().map(|r| r.0).collect();
         let expected = ["mantle", "core"].map(|name| Some(name.to_owned()));
@@ -82,7 +87,7 @@ fn names_go_into_every_export_that_has_names_and_come_back_from_there() {
     }
     for file in ["s.mesh", "s.meshb"] {
         place.run_line(&format!("export s.tetdb {file}")).succeeds();
-        let line = format!("mesh {file} -o again.tetdb --regions seeds --force");
+        let line = format!("mesh {file} -o again.tetdb --force");
         place.run_line(&line).succeeds();
         let names: Vec<_> = regions(&place, "again.tetdb").into_iter().map(|r| r.0).collect();
         let expected = ["ref_1", "ref_2"].map(|name| Some(name.to_owned()));
@@ -113,16 +118,31 @@ fn holes_and_attributes_of_a_poly_choose_regions_where_seeds_do() {
     place.write("hole.poly", text("1\n1 1.5 1.5 1.5", "1\n1 0.5 0.5 0.5 7 0.1"));
     place.write("full.poly", text("0", "2\n1 0.5 0.5 0.5 7 0.1\n2 1.5 1.5 1.4 8"));
     place.write("bad.poly", text("1\n1 0.4 0.5 0.5", "1\n1 0.5 0.5 0.5 7"));
-    place.run_line("mesh hole.poly --regions seeds").succeeds();
+    for rule in ["", "--regions seeds", "--regions all-but-holes"] {
+        place.run_line(&format!("mesh hole.poly --force {rule}")).succeeds();
+        let expected = vec![(Some("attribute_7".to_owned()), true), (None, false)];
+        assert_eq!(regions(&place, "hole.tetdb"), expected);
+    }
     let named = |name: &str| (Some(name.to_owned()), true);
-    let expected = vec![named("attribute_7"), (None, false)];
-    assert_eq!(regions(&place, "hole.tetdb"), expected);
-    place.run_line("mesh full.poly --regions seeds").succeeds();
-    let expected = vec![named("attribute_7"), named("attribute_8")];
-    assert_eq!(regions(&place, "full.tetdb"), expected);
-    refused(&place, "mesh bad.poly --regions seeds", "bad-seed");
+    let coarse = tets(&place, "hole.tetdb");
+    // The largest volume of a region makes it finer. A hole outside changes nothing, a region without a point is filled.
+    place.write("fine.poly", text("2\n1 9 9 9\n2 1.5 1.5 1.5", "1\n1 0.5 0.5 0.5 7 0.002"));
+    place.run_line("mesh fine.poly").succeeds();
+    assert!(tets(&place, "fine.tetdb") > 4 * coarse);
+    place.write("half.poly", text("0", "1\n1 1.5 1.5 1.5 8"));
+    let run = place.run_line("mesh half.poly").succeeds();
+    assert!(run.stderr().contains("every region without a hole point"), "{}", run.stderr());
+    assert_eq!(regions(&place, "half.tetdb"), [(None, true), named("attribute_8")]);
+    place.run_line("mesh half.poly -o parity.tetdb --regions parity").succeeds();
+    assert_eq!(regions(&place, "parity.tetdb"), [(None, true), (None, false)]);
+    for rule in ["", "--regions seeds"] {
+        place.run_line(&format!("mesh full.poly --force {rule}")).succeeds();
+        let expected = vec![named("attribute_7"), named("attribute_8")];
+        assert_eq!(regions(&place, "full.tetdb"), expected);
+        refused(&place, &format!("mesh bad.poly {rule}"), "bad-seed");
+    }
     // Other rules fill their regions; names apply where they fit.
-    place.run_line("mesh bad.poly -o parity.tetdb").succeeds();
+    place.run_line("mesh bad.poly -o parity.tetdb --regions parity --force").succeeds();
     let expected = vec![named("attribute_7"), (None, false)];
     assert_eq!(regions(&place, "parity.tetdb"), expected);
 }

@@ -76,7 +76,7 @@ fn points_of_a_poly_that_mark_holes_and_regions_are_noted() {
         1\n1 0.1 0.1 0.1\n2\n1 0.2 0.2 0.2 7 0.1\n2 0.3 0.2 0.2 8\n";
     place.write("part.poly", text);
     let said = place.run_line("check part.poly").succeeds().stderr();
-    for words in ["hole points (1) count where", "regions with an attribute or reference (2) are"] {
+    for words in ["hole points (1) leave their", "regions of the file (2) are filled"] {
         assert!(said.contains(words), "{said}");
     }
 }

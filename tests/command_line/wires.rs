@@ -266,3 +266,23 @@ fn edges_and_points_in_wrong_places_are_refused_with_the_place() {
     assert_eq!(run.error()["code"], "usage");
     place.run_line("mesh box.obj --embed-edges edge.obj").succeeds();
 }
+
+#[test]
+fn polygons_of_two_corners_in_a_surface_are_embedded_edges() {
+    let place = Place::new();
+    let points = "1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0 0 1\n6 1 0 1\n7 1 1 1\n8 0 1 1\n9 .5 .5 .3\n10 .5 .5 .7\n11 .3 .4 .5\n";
+    let sides =
+        "1\n4 1 4 3 2\n1\n4 5 6 7 8\n1\n4 1 2 6 5\n1\n4 3 4 8 7\n1\n4 1 5 8 4\n1\n4 2 3 7 6\n";
+    let edges = "1 0 7\n2 9 10\n2 0 8\n2 10 11\n2 11 9\n";
+    place.write("rods.poly", format!("11 3\n{points}8 1\n{sides}{edges}0\n0\n"));
+    let run = place.run_line("mesh rods.poly -o rods.tetdb").succeeds();
+    assert!(run.stderr().contains("3 polygons of two corners"), "{}", run.stderr());
+    let verified = place.run_line("verify rods.tetdb --full --json").succeeds().json();
+    assert_eq!((&verified["edges_present"], &verified["edges_missing"]), (&3.into(), &0.into()));
+    // The same as a surface and its edges from two files, also for a store that is begun anew.
+    place.write("box.poly", format!("11 3\n{points}6 0\n{sides}0\n0\n"));
+    place.run_line("mesh box.poly --embed-edges rods.poly -o two.tetdb").succeeds();
+    assert_eq!(place.digest("rods.tetdb"), place.digest("two.tetdb"));
+    let again = place.run_line("mesh rods.poly -o rods.tetdb").succeeds().stderr();
+    assert!(again.contains("already holds"), "{again}");
+}

@@ -55,6 +55,14 @@ pub enum SurfaceError {
         /// Three of them.
         cells: [u32; 3],
     },
+    /// A polygon or facet cannot be cut into triangles.
+    #[error("a polygon or facet of {} corners, the first at {}, {reason}", points.len(), show(points.first().copied().unwrap_or_default()))]
+    Polygon {
+        /// The reason.
+        reason: &'static str,
+        /// Its corners.
+        points: Vec<Point>,
+    },
     /// The surface is too small to compute with exactly.
     #[error(
         "the surface is too small to compute with exactly: its longest extent is {extent:e}, expected above 1e-24"
@@ -103,6 +111,7 @@ impl SurfaceError {
             Self::Memory { .. } | Self::EmbedMemory { .. } => Code::Memory,
             Self::NoSuchVertex { .. } => Code::IndexOutOfRange,
             Self::SharedFace { .. } => Code::UnsupportedContent,
+            Self::Polygon { reason, .. } => super::polygon::code(reason),
             Self::TooSmall { .. } => Code::CoordinateRange,
             Self::Invalid { defect, .. } => defect.code(),
             Self::Embed(wire) => wire.code(),
@@ -117,6 +126,9 @@ impl SurfaceError {
             Self::EmbedMemory { .. } => "allow more memory, or take fewer edges and points",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
             Self::SharedFace { .. } => "remove cells that are there twice or overlap others",
+            Self::Polygon { .. } => {
+                "give it as simple polygons or as triangles, in the program the surface comes from"
+            }
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),
             Self::Embed(wire) => wire.help(),

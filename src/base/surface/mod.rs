@@ -1,7 +1,7 @@
 //! The input: a closed surface of triangles with labels, welded and validated exactly.
 //!
 //! Reading order: [`triangles`](Surface) (the surface), `weld` (building one), `cells` (one
-//! from volume cells), `edges` (triangles at each edge),
+//! from volume cells), `polygon` (cutting polygons), `edges` (triangles at each edge),
 //! `orientation` (turning triangles alike), `contact` (how two triangles touch), `boxes`, `box_pairs` and `stars`
 //! (pairs that may touch), `validate` (all checks), `defect` (errors and suggestions), `boundary_loops` (open edges),
 //! `weld_near` and `repair` (repair on demand), `fitness` (mesh quality that the triangles allow), `split` (finer
@@ -27,6 +27,7 @@ mod fitness;
 mod orientation;
 mod point_sizes;
 mod point_tree;
+mod polygon;
 mod repair;
 mod seeds;
 mod seeker;

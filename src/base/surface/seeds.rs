@@ -39,25 +39,14 @@ impl Seed {
         Some(Self { point, kind })
     }
 
-    /// A line of a file: `x y z`, `x y z name` or `x y z hole`, also with commas; the name may have spaces.
-    pub fn parse_line(line: &str) -> Option<Self> {
-        let mut rest = line;
-        let mut words = [""; 3];
-        for word in &mut words {
-            rest = rest.trim_start();
-            let end = rest.find(|c: char| c == ',' || c.is_whitespace());
-            let (found, after) = rest.split_at(end.unwrap_or(rest.len()));
-            *word = found;
-            rest = after.trim_start();
-            rest = rest.strip_prefix(',').unwrap_or(rest);
-        }
-        let point = point_of(words.into_iter())?;
-        let kind = match rest.trim() {
+    /// A seed of a file: `name` is that of the region, nothing, or `hole`.
+    pub fn named(point: Point, name: &str) -> Self {
+        let kind = match name {
             "hole" => SeedKind::Hole,
             "" => SeedKind::Region(None),
             name => SeedKind::Region(Some(name.to_owned())),
         };
-        Some(Self { point, kind })
+        Self { point, kind }
     }
 }
 
@@ -90,16 +79,9 @@ mod tests {
             let seed = Seed::parse_region(text).expect("a seed");
             assert_eq!(seed.to_string(), text);
         }
-        let lines = ["1 2 3 salt rock", "1,2,3,salt rock", " 1, 2 ,3  salt rock "];
-        for line in lines {
-            let name = Some("salt rock".to_owned());
-            let found = Seed::parse_line(line).map(|seed| seed.kind);
-            assert_eq!(found, Some(SeedKind::Region(name)), "{line}");
-        }
-        assert_eq!(Seed::parse_line("1 2 3 hole").map(|s| s.kind), Some(SeedKind::Hole));
+        assert_eq!(Seed::named(Point::ZERO, "hole").kind, SeedKind::Hole);
         for text in ["", "1,2", "1,2,x,rock", "1,nan,2"] {
             assert_eq!(Seed::parse_region(text), None, "{text}");
-            assert_eq!(Seed::parse_line(text), None, "{text}");
         }
         assert_eq!(Seed::parse_hole("1,2,3,rock"), None);
     }

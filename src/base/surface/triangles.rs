@@ -34,6 +34,10 @@ pub struct Surface {
     pub notes: Vec<Note>,
     /// Seeds from the files, in order.
     pub seeds: Vec<Seed>,
+    /// Without another rule, volumes without a seed are filled, as in TetGen's files; else they stay empty where there are seeds.
+    pub fills_rest: bool,
+    /// Lengths that the files ask for, with the names of their regions.
+    pub region_sizes: Vec<(String, f64)>,
 }
 
 /// One file of a surface and the triangles that came from it.
@@ -133,6 +137,11 @@ pub enum NoteKind {
         /// Number of polygons.
         n: u64,
     },
+    /// Polygons with dents or with corners in line were cut otherwise.
+    CutPolygons {
+        /// Number of polygons.
+        n: u64,
+    },
     /// Elements that are no part of a surface (tetrahedra, lines, …) were left out.
     SkippedElements {
         /// The kind of element.
@@ -154,9 +163,34 @@ pub enum NoteKind {
     },
     /// What a caller that gives arrays says of them.
     Said(String),
-    /// A planar facet of several polygons or with holes was taken polygon by polygon.
-    SplitFacets {
+    /// Regions whose solid elements belong to several groups have no name.
+    MixedRegions {
+        /// Number of regions.
+        n: u64,
+    },
+    /// Groups some of whose faces belong to another group too, which gives them their label.
+    OtherGroups {
+        /// Names of the groups.
+        names: String,
+    },
+    /// Bytes behind the content of a file were left out.
+    TrailingBytes {
+        /// Number of bytes.
+        n: u64,
+    },
+    /// Curved faces were taken as flat ones between their corners.
+    CurvedFaces {
+        /// Number of faces.
+        n: u64,
+    },
+    /// Facets of several polygons or with holes were cut as a whole.
+    CutFacets {
         /// Number of facets.
+        n: u64,
+    },
+    /// Polygons of two corners are edges to embed.
+    Edges {
+        /// Number of edges.
         n: u64,
     },
 }
@@ -188,31 +222,52 @@ impl fmt::Display for Note {
             NoteKind::FannedPolygons { n } => {
                 write!(f, "{n} polygons were cut into triangles from their first vertex")
             }
+            NoteKind::CutPolygons { n } => {
+                write!(
+                    f,
+                    "{n} polygons with dents or corners in line were cut into the triangles of their plane"
+                )
+            }
             NoteKind::SkippedElements { what, n } => {
                 write!(f, "{n} {what} were left out; only the surface is read")
             }
             NoteKind::VolumePoints { points, n } => {
                 let (what, use_of) = match points {
-                    VolumePoints::Holes => (
-                        "hole points",
-                        "count where regions are filled by seeds, and are ignored else",
-                    ),
-                    VolumePoints::Regions => (
-                        "regions with an attribute or reference",
-                        "are named by it, and are what is filled where regions are filled by seeds",
-                    ),
+                    VolumePoints::Holes => ("hole points", "leave their regions empty"),
+                    VolumePoints::Regions => ("regions of the file", "are filled and named so"),
                 };
-                write!(f, "{what} ({n}) {use_of}")
+                write!(f, "{what} ({n}) {use_of}, unless another rule fills regions")
             }
             NoteKind::BoundaryOfCells { n } => write!(
                 f,
                 "the boundary of {n} volume cells, and faces between their regions, are the surface"
             ),
             NoteKind::Said(text) => f.write_str(text),
-            NoteKind::SplitFacets { n } => write!(
+            NoteKind::MixedRegions { n } => {
+                write!(
+                    f,
+                    "{n} regions hold elements of several groups with no triangles between them, and get no name"
+                )
+            }
+            NoteKind::OtherGroups { names } => write!(
                 f,
-                "{n} facets have several polygons or holes; each polygon was taken for itself"
+                "faces of the groups {names} belong to another group before, and have its label"
             ),
+            NoteKind::TrailingBytes { n } => {
+                write!(f, "{n} bytes behind the declared content were left out")
+            }
+            NoteKind::CurvedFaces { n } => {
+                write!(f, "{n} curved faces were taken as flat ones between their corners")
+            }
+            NoteKind::CutFacets { n } => {
+                write!(f, "{n} facets of several polygons or with holes were cut as a whole")
+            }
+            NoteKind::Edges { n } => {
+                write!(
+                    f,
+                    "{n} polygons of two corners are edges, embedded where the surface is meshed"
+                )
+            }
         }
     }
 }

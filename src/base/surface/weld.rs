@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::polygon::{cut_facet, cut_polygon};
 use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
 use crate::geom::Point;
 use crate::storage::{filled, push};
@@ -26,6 +27,10 @@ pub struct SurfaceBuilder {
     n_welded: u64,
     /// Polygons of this file with more than three corners.
     n_fanned: u64,
+    /// Those of them that are no fan from their first corner.
+    n_cut: u64,
+    /// First triangle and corners of each polygon of this file that came before its vertices.
+    uncut: Vec<[u32; 2]>,
     /// Triangles of this file are given by position, not by the file's vertex numbers.
     by_position: bool,
     /// Bytes it may hold; `None` for as many as there are.
@@ -51,7 +56,12 @@ impl SurfaceBuilder {
 
     /// Refuses to exceed the memory cap; called before an array grows.
     fn check_bytes(&self) -> Result<(), SurfaceError> {
-        match self.bytes_max.filter(|&most| self.bytes() > most) {
+        self.check_more(0)
+    }
+
+    /// Refuses `more` bytes that do not fit beside what it holds.
+    pub fn check_more(&self, more: u64) -> Result<(), SurfaceError> {
+        match self.bytes_max.filter(|&most| self.bytes() + more > most) {
             None => Ok(()),
             Some(bytes_max) => Err(SurfaceError::Memory {
                 bytes_max,
@@ -68,7 +78,8 @@ impl SurfaceBuilder {
         let surface = &self.surface;
         self.before = [surface.points.len(), surface.notes.len(), surface.seeds.len()];
         self.file2vert.clear();
-        (self.n_welded, self.n_fanned, self.by_position) = (0, 0, false);
+        (self.n_welded, self.n_fanned, self.n_cut, self.by_position) = (0, 0, 0, false);
+        self.uncut.clear();
         self.surface
             .files
             .push(SourceFile { name: name.to_owned(), triangle_first: self.triangle_first as u32 });
@@ -147,15 +158,102 @@ impl SurfaceBuilder {
         Ok(())
     }
 
-    /// Adds a polygon of at least three vertices of the file as a fan from its first one.
+    /// Adds a polygon of at least three vertices of the file: a fan from its first one where that is right, else other triangles of its
+    /// corners. A polygon before its vertices is cut at the end of the file.
     ///
     /// # Errors
-    /// [`SurfaceError::TooLarge`] beyond 2^30 triangles.
+    /// [`SurfaceError::TooLarge`] beyond 2^30 triangles; [`SurfaceError::Polygon`] for one that crosses itself, repeats a corner or has
+    /// no area.
     pub fn polygon(&mut self, corners: &[u32], label: u32) -> Result<(), SurfaceError> {
         debug_assert!(corners.len() >= 3);
-        self.n_fanned += u64::from(corners.len() > 3);
-        for pair in corners[1..].windows(2) {
-            self.triangle([corners[0], pair[0], pair[1]], label)?;
+        let mut other = None;
+        if corners.len() > 3 {
+            self.n_fanned += 1;
+            match self.cut(corners) {
+                None => {
+                    let first = self.surface.triangles.len() as u32;
+                    self.uncut.push([first, corners.len() as u32]);
+                }
+                Some(cut) => other = cut?,
+            }
+        }
+        match other {
+            Some(triangles) => triangles.into_iter().try_for_each(|t| self.triangle(t, label)),
+            None => (corners[1..].windows(2))
+                .try_for_each(|pair| self.triangle([corners[0], pair[0], pair[1]], label)),
+        }
+    }
+
+    /// Adds a facet of vertices of the file: what its polygons enclose, without the parts around its holes. Polygons of one or two
+    /// corners are vertices and edges in it; one has at least three.
+    ///
+    /// # Errors
+    /// As [`SurfaceBuilder::polygon`]; a hole that is not inside.
+    pub fn facet(
+        &mut self,
+        polygons: &[Vec<u32>],
+        holes: &[Point],
+        label: u32,
+    ) -> Result<(), SurfaceError> {
+        if let ([polygon], []) = (polygons, holes) {
+            return self.polygon(polygon, label);
+        }
+        // Vertices of the file with one position are one corner.
+        let (mut known, mut vertices) = (HashMap::new(), Vec::new());
+        let mut corner = |&v: &u32| {
+            let vert = self.file2vert.get(v as usize).ok_or(SurfaceError::NoSuchVertex {
+                triangle: (self.surface.triangles.len() - self.triangle_first) as u32,
+                vertex: v,
+                n_vertices: self.file2vert.len(),
+            })?;
+            Ok(*known.entry(*vert).or_insert_with(|| {
+                vertices.push(v);
+                vertices.len() as u32 - 1
+            }))
+        };
+        let polygons = polygons.iter().map(|polygon| polygon.iter().map(&mut corner).collect());
+        let polygons = polygons.collect::<Result<Vec<Vec<u32>>, SurfaceError>>()?;
+        let polygons: Vec<&[u32]> = polygons.iter().map(Vec::as_slice).collect();
+        let points = self.positions(&vertices).unwrap_or_default();
+        let cut = cut_facet(&points, &polygons, holes);
+        let triangles = cut.map_err(|reason| SurfaceError::Polygon { reason, points })?;
+        let triangles = triangles.into_iter().map(|t| t.map(|k| vertices[k as usize]));
+        triangles.into_iter().try_for_each(|t| self.triangle(t, label))
+    }
+
+    /// Triangles of a polygon instead of its fan; `None` while a vertex is not known.
+    fn cut(&mut self, corners: &[u32]) -> Option<Result<Option<Vec<[u32; 3]>>, SurfaceError>> {
+        let points = self.positions(corners)?;
+        let cut = cut_polygon(&points);
+        self.n_cut += u64::from(matches!(cut, Ok(Some(_))));
+        let cut = cut.map(|triangles| {
+            triangles.map(|t| t.into_iter().map(|t| t.map(|k| corners[k as usize])).collect())
+        });
+        Some(cut.map_err(|reason| SurfaceError::Polygon { reason, points }))
+    }
+
+    /// Positions of vertices of the file, if all are known.
+    fn positions(&self, vertices: &[u32]) -> Option<Vec<Point>> {
+        let point = |&v: &u32| {
+            let vert = *self.file2vert.get(v as usize)?;
+            self.surface.points.get(vert as usize).copied()
+        };
+        vertices.iter().map(point).collect()
+    }
+
+    /// Cuts the polygons that came before their vertices.
+    fn cut_late(&mut self) -> Result<(), SurfaceError> {
+        for [first, n] in std::mem::take(&mut self.uncut) {
+            let triangles = first as usize..(first + n - 2) as usize;
+            let fan = &self.surface.triangles[triangles.clone()];
+            let corners: Vec<u32> =
+                [fan[0][0], fan[0][1]].into_iter().chain(fan.iter().map(|t| t[2])).collect();
+            // A vertex that is still missing is reported with its triangle.
+            if let Some(cut) = self.cut(&corners)
+                && let Some(cut) = cut?
+            {
+                self.surface.triangles[triangles].copy_from_slice(&cut);
+            }
         }
         Ok(())
     }
@@ -185,15 +283,47 @@ impl SurfaceBuilder {
 
     /// The middle of four vertices of the current file, where it has them.
     pub fn middle(&self, corners: [u32; 4]) -> Option<Point> {
-        let point = |v: u32| {
-            let vert = *self.file2vert.get(v as usize)?;
-            self.surface.points.get(vert as usize).copied()
-        };
         let mut sum = Point::ZERO;
-        for v in corners {
-            sum += point(v)?;
+        for p in self.positions(&corners)? {
+            sum += p;
         }
         Some(0.25 * sum)
+    }
+
+    /// Volume of a tetrahedron of vertices of the current file, where it has them.
+    pub fn volume(&self, corners: [u32; 4]) -> Option<f64> {
+        let p = self.positions(&corners)?;
+        Some((p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]).abs())
+    }
+
+    /// The welded vertex of a vertex of the current file.
+    pub fn welded(&self, vertex: u32) -> Option<u32> {
+        self.file2vert.get(vertex as usize).copied()
+    }
+
+    /// The position of a vertex of the current file.
+    pub fn position(&self, vertex: u32) -> Option<Point> {
+        Some(self.positions(&[vertex])?[0])
+    }
+
+    /// Triangles of the current file so far, as vertices of the file.
+    pub fn file_triangles(&self) -> impl Iterator<Item = &[u32; 3]> {
+        self.surface.triangles[self.triangle_first..].iter()
+    }
+
+    /// Marks all volumes of the surface as filled but those with a hole.
+    pub fn fill_rest(&mut self) {
+        self.surface.fills_rest = true;
+    }
+
+    /// Asks for a length in the region of a name.
+    pub fn region_size(&mut self, name: String, h: f64) {
+        self.surface.region_sizes.push((name, h));
+    }
+
+    /// Lengths asked for in regions so far.
+    pub fn region_sizes(&self) -> &[(String, f64)] {
+        &self.surface.region_sizes
     }
 
     /// Adds a note about the current file.
@@ -207,6 +337,7 @@ impl SurfaceBuilder {
     /// # Errors
     /// The first triangle and vertex number without a vertex, as [`SurfaceError::NoSuchVertex`].
     pub fn end_file(&mut self) -> Result<(), SurfaceError> {
+        self.cut_late()?;
         if !self.by_position {
             let map = &self.file2vert;
             for (i, triangle) in
@@ -224,8 +355,11 @@ impl SurfaceBuilder {
         if self.n_welded > 0 {
             self.note(NoteKind::WeldedVertices { n: self.n_welded });
         }
-        if self.n_fanned > 0 {
-            self.note(NoteKind::FannedPolygons { n: self.n_fanned });
+        if self.n_cut > 0 {
+            self.note(NoteKind::CutPolygons { n: self.n_cut });
+        }
+        if self.n_fanned > self.n_cut {
+            self.note(NoteKind::FannedPolygons { n: self.n_fanned - self.n_cut });
         }
         self.file2vert = Vec::new();
         Ok(())

@@ -12,6 +12,7 @@ const REGIONS: &[&str] = &[
     "Only the region directly behind the outermost shells",
     "Regions behind triangles whose front side looks away from them",
     "Regions with a seed (--region-seed, --seeds, or regions in the surface's files); where only holes are given, all others",
+    "Every bounded region without a hole (--hole, --seeds, or holes in the surface's files)",
 ];
 const OPTIMIZE: &[&str] = &[
     "Nothing after the last vertex is inserted",
@@ -71,7 +72,7 @@ pub struct ShapeArgs {
     /// without moving the surface
     #[arg(long, help_heading = "Sizes")]
     pub refine_surface: bool,
-    /// Which regions to fill [default: parity; with seeds or holes: seeds]
+    /// Which regions to fill [default: what the surface's files say, else parity; with seeds or holes: seeds]
     #[arg(long, value_name = "RULE", value_parser = word_of::<Regions>(REGIONS), help_heading = "Regions")]
     pub regions: Option<Regions>,
     /// A point inside a region, and what it is called; may be repeated
@@ -80,7 +81,7 @@ pub struct ShapeArgs {
     /// A point inside a region that stays empty; may be repeated
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Regions")]
     pub hole: Vec<String>,
-    /// Seeds and holes from a file: a line `x y z name` or `x y z hole` for each
+    /// Seeds and holes from a file: a line `x y z name` or `x y z hole` for each, or with commas or semicolons
     #[arg(long, value_name = "FILE", help_heading = "Regions")]
     pub seeds: Option<PathBuf>,
     /// How much to improve the shapes of tetrahedra [default: full]

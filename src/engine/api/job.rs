@@ -10,10 +10,10 @@ use super::error::{Error, Remedy};
 use super::field_arrays::is_in_store;
 use super::surface::source;
 use crate::pipeline::{MeshOptions, RECIPE, recipe_of};
-use tetdb_base::surface::{Seed, SeedKind};
+use tetdb_base::surface::{self, SeedKind};
 use tetdb_io::read::{FileSizes, read_sizes, size_files};
 use tetdb_kernel::boundary::RegionPolicy;
-use tetdb_kernel::sizing::{Background, BackgroundMesh};
+use tetdb_kernel::sizing::{Background, BackgroundMesh, Length, RegionSize};
 use tetdb_schema::source::Source;
 use tetdb_store::store::Catalog;
 
@@ -73,21 +73,42 @@ pub fn identify_sizes(options: &mut MeshOptions) -> Result<(), Error> {
     Ok(())
 }
 
-/// Adds the seeds of the surface's files to the options, so that the record is complete.
+/// Adds the seeds of the surface's files to the options, so that the record is complete. Returns a note if they decide what is filled.
 ///
-/// Under the rule `seeds` they count like the user's seeds. Under any other rule, only their names are used.
-pub fn take_seeds(options: &mut MeshOptions, seeds: &[Seed]) {
-    let is_rule = options.regions.policy == RegionPolicy::Seeds;
-    for seed in seeds {
+/// They decide it if no rule and no seed is asked for. Under rules by seeds they count like the user's seeds, together with the lengths
+/// asked for in their regions. Under any other rule, only their names are used.
+pub fn take_seeds(options: &mut MeshOptions, surface: &surface::Surface) -> Option<String> {
+    let rule = &mut options.regions;
+    let is_default = !rule.is_given && rule.seeds.is_empty() && !surface.seeds.is_empty();
+    rule.is_given = true;
+    if is_default {
+        rule.policy = match surface.fills_rest {
+            true => RegionPolicy::AllButHoles,
+            false => RegionPolicy::Seeds,
+        };
+    }
+    let is_rule = matches!(rule.policy, RegionPolicy::Seeds | RegionPolicy::AllButHoles);
+    for seed in &surface.seeds {
         let list = match (is_rule, &seed.kind) {
-            (true, _) => &mut options.regions.seeds,
-            (false, SeedKind::Region(Some(_))) => &mut options.regions.names,
+            (true, _) => &mut rule.seeds,
+            (false, SeedKind::Region(Some(_))) => &mut rule.names,
             (false, _) => continue,
         };
         if !list.contains(seed) {
             list.push(seed.clone());
         }
     }
+    if is_rule {
+        let sizes = surface.region_sizes.iter();
+        let sizes =
+            sizes.map(|(which, h)| RegionSize { which: which.clone(), h: Length::units(*h) });
+        options.sizes.regions.extend(sizes);
+    }
+    let what = match surface.fills_rest {
+        true => "every region without a hole point",
+        false => "the regions of its solid elements",
+    };
+    is_default.then(|| format!("regions are those of the surface's files: filled is {what}"))
 }
 
 /// Reads the size file of identified options, in at most half of `cap`. Sizes that were given as arrays are in `store`.
@@ -124,9 +145,9 @@ pub fn read_background(
 
 /// Hash of a size file and of its mesh file, if it has one.
 fn hash(path: &Path) -> Result<String, Error> {
-    let (sizes, mesh) = size_files(path)?;
+    let (sizes, beside) = size_files(path)?;
     let mut all = Xxh3::new();
-    for file in [Some(sizes), mesh].into_iter().flatten() {
+    for file in std::iter::once(sizes).chain(beside) {
         for half in source(&file)?.hash {
             all.update(&half.to_le_bytes());
         }

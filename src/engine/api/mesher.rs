@@ -125,6 +125,7 @@ impl Mesher {
     /// Sets which regions are filled.
     pub fn regions(mut self, regions: Regions) -> Self {
         self.options.mesh.regions.policy = regions;
+        self.options.mesh.regions.is_given = true;
         self
     }
 
@@ -255,7 +256,9 @@ impl Mesher {
             return Err(PipelineError::BadSeed { option, found: seed.to_string() }.into());
         }
         job::identify_sizes(mesh)?;
-        job::take_seeds(mesh, &self.surface.inner.seeds);
+        if let Some(note) = job::take_seeds(mesh, &self.surface.inner) {
+            self.settings.note(format!("note: {note}"));
+        }
         Ok(options)
     }
 

@@ -116,6 +116,8 @@ pub use tetdb_base::surface::show as show_point;
 pub use tetdb_base::surface::{Defect, SplitReport};
 pub use tetdb_base::surface::{Seed, SeedKind};
 pub use tetdb_io::read::WireKind as EmbeddedKind;
+#[doc(hidden)]
+pub use tetdb_io::read::{PointColumns, PointTable, read_seeds};
 pub use tetdb_io::write::SurfaceWritten;
 pub use tetdb_kernel::samples::PREFIX as SAMPLE_PREFIX;
 pub use tetdb_kernel::sizing::SizeWarning;

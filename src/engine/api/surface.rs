@@ -124,7 +124,8 @@ impl Surface {
         let paths: Vec<PathBuf> = files.into_iter().map(|p| p.as_ref().to_owned()).collect();
         guarded(&Settings::new(), || {
             let scratch = Settings::new().scratch_space(0)?;
-            Self::read_in(&paths, &scratch)?.oriented(&ScratchSpace::boundless())
+            let whole = ScratchSpace::boundless();
+            Self::read_in(&paths, &scratch)?.oriented(&whole)?.with_own_edges(&whole)
         })
     }
 

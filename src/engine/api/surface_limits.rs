@@ -13,7 +13,7 @@ use tetdb_kernel::sizing::SizeOptions;
 impl Surface {
     /// Reads files as one surface, or generates one sample, within the memory of `settings`.
     ///
-    /// Effects: notes on the content go to the listener of `settings`.
+    /// Effects: notes on the content go to the listener of `settings`. Edges of `.poly` files are not yet embedded.
     ///
     /// # Errors
     /// As [`Surface::read`] and [`Surface::sample`].
@@ -43,6 +43,15 @@ impl Surface {
         guarded(settings, || {
             let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
             self.with_wires(file.as_ref(), kind, name, &scratch)
+        })
+    }
+
+    /// Embeds the edges of the surface's own files, within the memory of `settings`. Call after sheets are embedded.
+    #[doc(hidden)]
+    pub fn own_edges_with(self, settings: &Settings) -> Result<Self, Error> {
+        guarded(settings, || {
+            let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
+            self.with_own_edges(&scratch)
         })
     }
 

@@ -12,8 +12,8 @@ use super::surface::{given, halves, source};
 use super::{Settings, Surface, guarded};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, attempt};
-use tetdb_base::surface::EmbeddedSet;
-use tetdb_io::read::{WireKind, read_wires};
+use tetdb_base::surface::{EmbeddedSet, NoteKind};
+use tetdb_io::read::{WireKind, is_stream, read_wires};
 use tetdb_io::write;
 
 impl Surface {
@@ -29,7 +29,7 @@ impl Surface {
         self
     }
 
-    /// Embeds the edges of a file: `.obj` (`l`), legacy `.vtk` or `.poly` (facets of two corners).
+    /// Embeds the edges of a file: `.obj` (`l`), legacy `.vtk` or `.poly` (polygons of two corners).
     ///
     /// Each becomes an undivided edge of the mesh, in its place. Edges may touch each other, sheets and the surface only in vertices
     /// that both have. Names: as in [`Surface::embedded`], which must be called first.
@@ -115,6 +115,25 @@ impl Surface {
             WireKind::Points => Origin::Points(named),
         };
         self.with_recorded(&set, name, Some(Source { origin, bytes, hash }), scratch)
+    }
+
+    /// Embeds the edges of the surface's own files: polygons of two corners in `.poly`. Call after sheets are embedded.
+    pub(super) fn with_own_edges(mut self, scratch: &ScratchSpace) -> Result<Self, Error> {
+        let notes = self.inner.notes.iter();
+        let files: Vec<String> = notes
+            .filter(|note| matches!(note.kind, NoteKind::Edges { .. }))
+            .map(|note| note.file.clone())
+            .collect();
+        for file in files {
+            if is_stream(Path::new(&file)) {
+                let message = "edges of a pipe cannot be embedded: they are read a second time";
+                return Err(Error::new(Code::UnreadableFile, message)
+                    .at(file)
+                    .with_help("write it to a file first"));
+            }
+            self = self.with_wires(Path::new(&file), WireKind::Edges, None, scratch)?;
+        }
+        Ok(self)
     }
 
     fn with_set(self, set: &EmbeddedSet, name: &str) -> Result<Self, Error> {

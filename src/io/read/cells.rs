@@ -3,10 +3,10 @@
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
+use super::SurfaceSink;
 use super::feed::{Feed, Result, name};
 use super::tetgen::read_node_file;
 use super::volume_cells::VolumeCells;
-use super::{ReadFault, SurfaceSink};
 use tetdb_base::surface::{NoteKind, Seed, SeedKind};
 use tetdb_schema::source::BOUNDARY_OF;
 
@@ -53,7 +53,7 @@ impl SurfaceSink<'_> {
         for (point, name) in feed.placed(boundary.finish(self.builder, label))? {
             match name.as_str() {
                 "" => self.builder.seed(Seed { point, kind: SeedKind::Region(None) }),
-                name => self.region(point, name),
+                name => drop(self.region(point, name)),
             }
         }
         if n > 0 {
@@ -119,20 +119,6 @@ pub(super) fn read_ele<R: BufRead>(
     }
     target.end_cells(&feed)?;
     feed.finish(target.builder)
-}
-
-/// Number of corners of a solid element of Gmsh.
-pub(super) fn gmsh_corners<R>(kind: i64, feed: &Feed<R>) -> Result<usize>
-where
-    R: BufRead,
-{
-    match kind {
-        4 | 11 | 29 | 30 | 31 => Ok(4),
-        7 | 14 | 19 => Ok(5),
-        6 | 13 | 18 | 90 | 91 => Ok(6),
-        5 | 12 | 17 | 92 | 93 => Ok(8),
-        _ => Err(feed.refuse(ReadFault::Unsupported(format!("solid elements of type {kind}")))),
-    }
 }
 
 #[cfg(test)]

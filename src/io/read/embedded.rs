@@ -4,30 +4,31 @@ use std::path::Path;
 
 use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::error::{FilePlace, ReadFault};
-use super::feed::{Feed, Result, name, parse};
-use super::open::{Reader, open, stem, unpacked_name};
-use super::{obj, tetgen, vtk};
+use super::feed::Result;
+use super::open::{open, stem, unpacked_name};
+use super::{PointColumns, PointRow, PointTable, obj, tetgen, vtk};
 use tetdb_base::geom::Point;
-use tetdb_base::surface::EmbeddedSet;
+use tetdb_base::surface::{EmbeddedSet, Seed};
 
 /// Reads the edges or the points of a file; labels are its groups or markers, else the name of the file. `cap`: bytes of memory allowed.
 ///
 /// # Errors
 /// The first [`ReadError`](super::ReadError) with its place; a file without any is one.
 pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<EmbeddedSet> {
-    let mut feed = open(path, cap / 4)?;
     let mut sink = EmbeddedSink::called(stem(path), cap / 4);
     let named = unpacked_name(path);
     let extension = named.extension().unwrap_or_default().to_string_lossy();
     match (extension.to_ascii_lowercase().as_str(), kind) {
-        ("obj", _) => obj::read_embedded(feed, kind, &mut sink)?,
-        ("vtk", _) => vtk::read(feed, kind, &mut sink)?,
+        ("obj", _) => obj::read_embedded(open(path, cap / 4)?, kind, &mut sink)?,
+        ("vtk", _) => vtk::read(open(path, cap / 4)?, kind, &mut sink)?,
         ("poly", WireKind::Edges) => {
             let nodes = named.with_extension("node");
-            tetgen::read_segments(feed, &nodes, cap / 4, &mut sink)?;
+            tetgen::read_segments(open(path, cap / 4)?, &nodes, cap / 4, &mut sink)?;
         }
-        ("node", WireKind::Points) => tetgen::read_nodes(&mut feed, &mut sink)?,
-        ("csv" | "txt" | "xyz", WireKind::Points) => read_table(&mut feed, &mut sink)?,
+        ("node", WireKind::Points) => tetgen::read_nodes(&mut open(path, cap / 4)?, &mut sink)?,
+        ("csv" | "txt" | "xyz" | "tsv" | "dat", WireKind::Points) => {
+            read_table(path, cap, &mut sink)?
+        }
         _ => {
             let help =
                 "edges are read from .obj, .vtk and .poly, points from .csv, .node, .obj and .vtk";
@@ -46,41 +47,27 @@ pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<EmbeddedSet> 
     Err(FilePlace::new(path).refuse(ReadFault::Unexpected { expected, found }))
 }
 
-/// Lines of three numbers, and a name behind them; between them commas, semicolons or blanks. A first line of words is a heading.
-fn read_table(feed: &mut Feed<Reader>, sink: &mut EmbeddedSink) -> Result<()> {
-    let mut line = Vec::new();
-    let mut is_first = true;
-    loop {
-        let place = feed.place();
-        line.clear();
-        if !feed.read_line(&mut line)? {
-            return Ok(());
-        }
-        let text = line.trim_ascii();
-        if text.is_empty() || text.starts_with(b"#") {
-            continue;
-        }
-        let is_break = |b: &u8| matches!(b, b',' | b';' | b'\t' | b' ');
-        let has_commas = text.iter().any(|b| matches!(b, b',' | b';'));
-        let parts = text.split(|b| if has_commas { matches!(b, b',' | b';') } else { is_break(b) });
-        let words: Vec<&[u8]> =
-            (parts.map(<[u8]>::trim_ascii)).filter(|w| has_commas || !w.is_empty()).collect();
-        let is_heading = is_first && words.iter().all(|w| parse::<f64>(w).is_none());
-        is_first = false;
-        if is_heading {
-            continue;
-        }
-        let mut p = [0.0; 3];
-        for (k, x) in p.iter_mut().enumerate() {
-            let word = words.get(k).copied().unwrap_or_default();
-            *x = feed.coordinate_of(word, &place)?;
-        }
-        let label = match has_commas {
-            true => words.get(3).map(|w| name(w)),
-            false => Some(name(&words.get(3..).unwrap_or_default().join(&b' '))),
-        };
-        let label = sink.label(label.unwrap_or_default().trim_matches('"'));
-        feed.placed(sink.mark(sink.set.points.len() as u32, label))?;
-        feed.placed(sink.point(Point::from_array(p)))?;
+/// Points from a table, each with its name.
+fn read_table(path: &Path, cap: u64, sink: &mut EmbeddedSink) -> Result<()> {
+    for row in PointTable::open(path, PointColumns::Named, cap / 4)? {
+        let PointRow { numbers: [x, y, z, _], name, place } = row?;
+        let label = sink.label(&name);
+        let v = sink.set.points.len() as u32;
+        let added = sink.mark(v, label).and_then(|()| sink.point(Point::new(x, y, z)));
+        added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
     }
+    Ok(())
+}
+
+/// Reads a file of seeds: points with the name of their region, without one, or with the name `hole`. `limit`: bytes of memory for pipes.
+///
+/// # Errors
+/// As [`PointTable::open`].
+pub fn read_seeds(path: &Path, limit: u64) -> Result<Vec<Seed>> {
+    let rows = PointTable::open(path, PointColumns::Named, limit)?;
+    let seed = |row: PointRow| {
+        let [x, y, z, _] = row.numbers;
+        Seed::named(Point::new(x, y, z), &row.name)
+    };
+    rows.map(|row| row.map(seed)).collect()
 }

@@ -83,6 +83,14 @@ pub enum ReadFault {
         /// The content found.
         found: String,
     },
+    /// A line of a file of points can be read in two ways.
+    #[error("{line} can be read in two ways: as `{}` or `{}`", readings[0], readings[1])]
+    TwoReadings {
+        /// The line.
+        line: String,
+        /// The values in either reading.
+        readings: [String; 2],
+    },
     /// A number is not a number, or not finite.
     #[error("expected a finite number as {what}, found {found}")]
     NotANumber {
@@ -151,7 +159,7 @@ impl ReadError {
             ReadFault::Unreadable(_) => Code::UnreadableFile,
             ReadFault::UnknownFormat(_) | ReadFault::SolidModel(_) => Code::UnknownFormat,
             ReadFault::Truncated { .. } => Code::TruncatedFile,
-            ReadFault::Unexpected { .. } => Code::UnexpectedText,
+            ReadFault::Unexpected { .. } | ReadFault::TwoReadings { .. } => Code::UnexpectedText,
             ReadFault::NotANumber { .. } => Code::NotANumber,
             ReadFault::IndexOutOfRange { .. } => Code::IndexOutOfRange,
             ReadFault::CountMismatch { .. } => Code::CountMismatch,
@@ -181,6 +189,9 @@ impl ReadError {
             }
             ReadFault::Truncated { .. } => {
                 "copy or download the file again; compare its length with the original's"
+            }
+            ReadFault::TwoReadings { .. } => {
+                "name the columns in a first line, such as `id x y z` or `x y z name`, with the separator of the lines below"
             }
             ReadFault::Unexpected { .. } | ReadFault::NotANumber { .. } => {
                 "look at that place; write the file again from the program it comes from"

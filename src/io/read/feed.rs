@@ -1,8 +1,10 @@
 //! Bytes of a file as words, lines or small blocks, each with its place.
 
-use std::io::{BufRead, Cursor, Read};
+use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
 
 use super::error::{FilePlace, ReadError, ReadFault, Spot};
+use super::words::COORDINATE_MAX;
+pub(super) use super::words::{check_point, name, not_a_number, parse, quote};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{SurfaceBuilder, SurfaceError};
 
@@ -10,8 +12,6 @@ use tetdb_base::surface::{SurfaceBuilder, SurfaceError};
 const WORD_MAX: usize = 4096;
 /// Longest line accepted where lines matter; a polygon of a million corners still fits.
 const LINE_MAX: usize = 16 << 20;
-/// Wanted lengths are kept in single precision, which ends at 3e38; the rest is left for sums and squares.
-const COORDINATE_MAX: f64 = 1e30;
 
 /// Result of everything that reads.
 pub(super) type Result<T> = std::result::Result<T, ReadError>;
@@ -34,10 +34,22 @@ pub(super) struct Feed<R> {
     reader: R,
     /// Length of the whole file.
     pub len: u64,
+    /// The first byte of content: 3 behind a byte order mark.
+    start: u64,
     pub at: Position,
     /// A comment runs from this byte to the end of its line.
     pub comment: Option<u8>,
     word: Vec<u8>,
+}
+
+impl<R: BufRead + Seek> Feed<R> {
+    /// Goes back to the first byte, behind a byte order mark.
+    pub fn rewind(&mut self) -> Result<()> {
+        let done = self.reader.seek(SeekFrom::Start(self.start));
+        done.map_err(|e| broken(self.place(), &e))?;
+        (self.at.offset, self.at.line) = (self.start, 1);
+        Ok(())
+    }
 }
 
 impl<R: BufRead> Feed<R> {
@@ -45,10 +57,17 @@ impl<R: BufRead> Feed<R> {
         Self {
             reader,
             len,
+            start: 0,
             at: Position { file: file.to_owned(), offset: 0, line: 1, is_binary: false },
             comment: None,
             word: Vec::new(),
         }
+    }
+
+    /// Skips the byte order mark of UTF-8 at the beginning.
+    pub fn skip_mark(&mut self) {
+        self.take(3);
+        self.start = 3;
     }
 
     /// Returns up to `N` first bytes without taking them, and their number.
@@ -413,6 +432,18 @@ impl<R: BufRead> Feed<R> {
         }
     }
 
+    /// Takes all bytes left, at most `limit`.
+    pub fn rest(&mut self, limit: u64) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let read = (&mut self.reader).take(limit.saturating_add(1)).read_to_end(&mut bytes);
+        read.map_err(|e| broken(self.place(), &e))?;
+        let needed = bytes.len() as u64;
+        match needed > limit {
+            true => Err(self.refuse(ReadFault::TooLarge { what: "the file", needed, limit })),
+            false => Ok(bytes),
+        }
+    }
+
     /// Skips `n` bytes.
     pub fn skip_bytes(&mut self, mut n: u64) -> Result<()> {
         while n > 0 {
@@ -446,27 +477,4 @@ fn fill<'b, R: BufRead>(reader: &'b mut R, at: &Position) -> Result<&'b [u8]> {
 
 fn broken(place: FilePlace, error: &std::io::Error) -> ReadError {
     place.refuse(ReadFault::Unreadable(error.to_string()))
-}
-
-/// The error of a word that is no finite number.
-pub(super) fn not_a_number(place: &FilePlace, what: &'static str, found: &[u8]) -> ReadError {
-    place.refuse(ReadFault::NotANumber { what, found: quote(found) })
-}
-
-/// `bytes` as a number in plain decimal text.
-pub(super) fn parse<T: std::str::FromStr>(bytes: &[u8]) -> Option<T> {
-    std::str::from_utf8(bytes).ok()?.parse().ok()
-}
-
-/// A short printable form of bytes from a file.
-pub(super) fn quote(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(40)]);
-    let clean: String = text.chars().map(|c| if c.is_control() { '?' } else { c }).collect();
-    format!("`{clean}`")
-}
-
-/// A name from a file: trimmed, printable.
-pub(super) fn name(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(bytes);
-    text.trim().chars().filter(|c| !c.is_control()).take(200).collect()
 }

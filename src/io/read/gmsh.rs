@@ -1,50 +1,151 @@
-//! Gmsh `.msh` 2.2 and 4.1, text and binary: triangles and quadrilaterals, physical groups as labels.
+//! Gmsh `.msh` of versions 1, 2, 4.0 and 4.1, text and binary: triangles and quadrilaterals, physical groups as labels.
 //!
-//! Sections this reader does not need are passed over. An element in several physical groups is
-//! given to the first (4.1); 2.2 repeats such elements, and validation reports the repetition.
+//! Sections this reader does not need are passed over. An element in several physical groups is given to the first, with a note;
+//! version 2 repeats such elements, one behind the other. Curved faces are taken by their corners.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::io::BufRead;
 
-use super::cells::gmsh_corners;
 use super::feed::{Feed, name};
-use super::gmsh_numbers::{GmshNumbers, NodeTags, Role, need_element_type};
+use super::gmsh_numbers::{ElementType, GmshNumbers, NodeTags, Role, need_element_type};
+use super::solids::Solids;
 use super::{ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
 
 /// State of a reader that all sections of a file share.
-struct GmshReader<'a, 'b, R> {
-    numbers: GmshNumbers<R>,
-    target: &'a mut SurfaceSink<'b>,
-    nodes: NodeTags,
+pub(super) struct GmshReader<'a, 'b, R> {
+    pub(super) numbers: GmshNumbers<R>,
+    pub(super) version: Version,
+    pub(super) target: &'a mut SurfaceSink<'b>,
+    pub(super) nodes: NodeTags,
     /// Names of the surface groups.
-    names: HashMap<i64, String>,
+    pub(super) names: HashMap<i64, String>,
     /// Surface entity -> its first physical group (4.1).
-    groups: HashMap<i64, i64>,
+    pub(super) groups: HashMap<i64, i64>,
     /// Surface entities inside a volume, where two partitions meet (4.1).
-    inside: HashSet<i64>,
+    pub(super) inside: HashSet<i64>,
     /// The label used last and the group it came from.
-    last: Option<(i64, u32)>,
-    n_solids: u64,
+    pub(super) last: Option<(i64, u32)>,
+    /// Corners and group of the last element.
+    pub(super) last_element: Option<(ElementType, [i64; 8], i64)>,
+    /// Surface groups with elements that another group has too.
+    pub(super) other_groups: BTreeSet<i64>,
+    /// Numbers at nodes by their tags, where they are wanted.
+    pub(super) node_data: Option<HashMap<i64, f64>>,
+    pub(super) solids: Solids,
+    pub(super) n_curved: u64,
     /// Names and groups of volumes, as of surfaces.
-    volume_names: HashMap<i64, String>,
-    volume_groups: HashMap<i64, i64>,
-    /// By name of a volume's group, the first tetrahedron of each volume.
-    first_tets: BTreeMap<String, Vec<[u32; 4]>>,
-    /// The groups and volumes whose first tetrahedron is known.
-    seen: HashSet<(i64, i64)>,
+    pub(super) volume_names: HashMap<i64, String>,
+    pub(super) volume_groups: HashMap<i64, i64>,
 }
 
-pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
-    feed.need_keyword("$MeshFormat")?;
+/// A version of the format.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Version {
+    V1,
+    V2,
+    V40,
+    V41,
+}
+
+impl<'a, 'b, R: BufRead> GmshReader<'a, 'b, R> {
+    /// Reads the head of a file.
+    fn open(mut feed: Feed<R>, target: &'a mut SurfaceSink<'b>) -> Result<Self> {
+        feed.need_word("`$MeshFormat`")?;
+        let (version, binary, big) = match feed.word() {
+            b"$NOD" | b"$ELM" => (Version::V1, false, false),
+            b"$MeshFormat" => read_format(&mut feed)?,
+            word => return Err(feed.unexpected("`$MeshFormat`, or `$NOD` of version 1", word)),
+        };
+        Ok(GmshReader {
+            numbers: GmshNumbers { feed, binary, big },
+            version,
+            target,
+            nodes: NodeTags::default(),
+            names: HashMap::new(),
+            groups: HashMap::new(),
+            inside: HashSet::new(),
+            last: None,
+            last_element: None,
+            other_groups: BTreeSet::new(),
+            node_data: None,
+            solids: Solids::default(),
+            n_curved: 0,
+            volume_names: HashMap::new(),
+            volume_groups: HashMap::new(),
+        })
+    }
+}
+
+pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
+    let mut mesh = GmshReader::open(feed, target)?;
+    mesh.read_sections()?;
+    if mesh.n_curved > 0 {
+        mesh.target.builder.note(NoteKind::CurvedFaces { n: mesh.n_curved });
+    }
+    if !mesh.other_groups.is_empty() {
+        let names: Vec<String> = mesh.other_groups.iter().map(|&g| mesh.group_name(g)).collect();
+        mesh.target.builder.note(NoteKind::OtherGroups { names: names.join(", ") });
+    }
+    mesh.target.leave_out_cells(mesh.solids.len());
+    std::mem::take(&mut mesh.solids).finish("solid elements", mesh.target);
+    mesh.target.end_cells(&mesh.numbers.feed)?;
+    mesh.numbers.feed.finish(mesh.target.builder)
+}
+
+/// Points, tetrahedra between them, and a number at each point.
+pub(super) type NodeData = (Vec<Point>, Vec<[u32; 4]>, Vec<f64>);
+
+/// Reads the tetrahedra of a file and the numbers of its first `$NodeData` at the nodes that have one.
+pub(super) fn read_node_data<R: BufRead>(
+    feed: Feed<R>,
+    target: &mut SurfaceSink,
+) -> Result<NodeData> {
+    let mut mesh = GmshReader::open(feed, target)?;
+    mesh.node_data = Some(HashMap::new());
+    mesh.read_sections()?;
+    let data = mesh.node_data.take().unwrap_or_default();
+    let feed = &mesh.numbers.feed;
+    let mut at = HashMap::new();
+    for (&tag, &h) in &data {
+        at.insert(mesh.nodes.find(tag, feed)?, h);
+    }
+    let tets = mesh.solids.tets();
+    let (mut points, mut numbers, mut position) = (Vec::new(), Vec::new(), HashMap::new());
+    for v in 0..mesh.target.builder.n_file_vertices() as u32 {
+        if let (Some(&h), Some(p)) = (at.get(&v), mesh.target.builder.position(v)) {
+            position.insert(v, points.len() as u32);
+            points.push(p);
+            numbers.push(h);
+        }
+    }
+    let place = |t: [u32; 4]| {
+        let corners = t.map(|v| position.get(&v).copied());
+        match corners {
+            [Some(a), Some(b), Some(c), Some(d)] => Ok([a, b, c, d]),
+            _ => Err(feed.unexpected("a number at every node of the tetrahedra", b"fewer")),
+        }
+    };
+    let tets = tets.map(place).collect::<Result<Vec<_>>>()?;
+    match data.is_empty() {
+        true => Err(feed.unexpected("a section `$NodeData`", b"none")),
+        false => Ok((points, tets, numbers)),
+    }
+}
+
+/// The section `$MeshFormat`: the version, whether numbers are binary, and whether their high bytes come first.
+fn read_format<R: BufRead>(feed: &mut Feed<R>) -> Result<(Version, bool, bool)> {
     feed.need_word("the format's version")?;
     let version = match feed.word() {
-        b"2" | b"2.0" | b"2.1" | b"2.2" => 2,
-        b"4.1" => 4,
+        b"2" | b"2.0" | b"2.1" | b"2.2" => Version::V2,
+        b"4" | b"4.0" => Version::V40,
+        b"4.1" => Version::V41,
         other => {
             let found = super::feed::quote(other);
-            return Err(feed.unsupported(format!("version {found} of .msh (2.2 and 4.1 can)")));
+            return Err(
+                feed.unsupported(format!("version {found} of .msh (1, 2, 4.0 and 4.1 can)"))
+            );
         }
     };
     let binary = match feed.integer("0 for text or 1 for binary")? {
@@ -67,44 +168,25 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     }
     feed.need_keyword("$EndMeshFormat")?;
     feed.skip_line()?;
-    let mut mesh = GmshReader {
-        numbers: GmshNumbers { feed, binary, big },
-        target,
-        nodes: NodeTags::default(),
-        names: HashMap::new(),
-        groups: HashMap::new(),
-        inside: HashSet::new(),
-        last: None,
-        n_solids: 0,
-        volume_names: HashMap::new(),
-        volume_groups: HashMap::new(),
-        first_tets: BTreeMap::new(),
-        seen: HashSet::new(),
-    };
-    mesh.read_sections(version)?;
-    if mesh.n_solids > 0 {
-        let n = mesh.n_solids;
-        mesh.target.builder.note(NoteKind::SkippedElements { what: "solid elements", n });
-        let first = std::mem::take(&mut mesh.first_tets);
-        mesh.target.regions_of_mesh(&first);
-    }
-    mesh.target.leave_out_cells(mesh.n_solids);
-    mesh.target.end_cells(&mesh.numbers.feed)?;
-    mesh.numbers.feed.finish(mesh.target.builder)
+    Ok((version, binary, big))
 }
 
 impl<R: BufRead> GmshReader<'_, '_, R> {
-    fn read_sections(&mut self, version: u32) -> Result<()> {
-        while self.numbers.feed.next_word()? {
+    fn read_sections(&mut self) -> Result<()> {
+        use Version::{V1, V2, V40, V41};
+        // The first section of version 1 has no head before it.
+        let mut is_taken = self.version == V1;
+        while is_taken || self.numbers.feed.next_word()? {
+            is_taken = false;
             let section = self.numbers.feed.word().to_vec();
             if section.first() != Some(&b'$') {
                 return Err(self.numbers.feed.unexpected("a section beginning with `$`", &section));
             }
             self.numbers.feed.skip_line()?;
-            match (section.as_slice(), version) {
+            match (section.as_slice(), self.version) {
                 (b"$PhysicalNames", _) => self.read_names()?,
-                (b"$Entities", 4) => self.read_entities(false)?,
-                (b"$PartitionedEntities", 4) => {
+                (b"$Entities", V40 | V41) => self.read_entities(false)?,
+                (b"$PartitionedEntities", V40 | V41) => {
                     self.numbers.size()?;
                     let n_ghosts = self.numbers.size()?;
                     for _ in 0..self.numbers.check_count("ghosts", n_ghosts, 2, 4)? {
@@ -113,14 +195,20 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                     }
                     self.read_entities(true)?;
                 }
-                (b"$Nodes", 2) => self.read_nodes_2()?,
+                (b"$NodeData", _) if self.node_data.as_ref().is_some_and(HashMap::is_empty) => {
+                    self.read_node_data()?;
+                }
+                (b"$NOD", V1) => self.read_nodes_2(false, "$ENDNOD")?,
+                (b"$ELM", V1) => self.read_elements_2_text("$ENDELM")?,
+                (b"$Nodes", V2) => self.read_nodes_2(false, "$EndNodes")?,
+                (b"$ParametricNodes", V2) => self.read_nodes_2(true, "$EndParametricNodes")?,
                 (b"$Nodes", _) => self.read_nodes_4()?,
-                (b"$Elements", 2) if self.numbers.binary => self.read_elements_2_binary()?,
-                (b"$Elements", 2) => self.read_elements_2_text()?,
+                (b"$Elements", V2) if self.numbers.binary => self.read_elements_2_binary()?,
+                (b"$Elements", V2) => self.read_elements_2_text("$EndElements")?,
                 (b"$Elements", _) => self.read_elements_4()?,
                 _ => {
-                    let end = [b"$End", &section[1..]].concat();
-                    self.numbers.feed.skip_past(&end)?;
+                    let end: &[u8] = if self.version == V1 { b"$END" } else { b"$End" };
+                    self.numbers.feed.skip_past(&[end, &section[1..]].concat())?;
                 }
             }
         }
@@ -149,6 +237,10 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         self.numbers.end("$EndPhysicalNames")
     }
 
+    fn group_name(&self, group: i64) -> String {
+        self.names.get(&group).cloned().unwrap_or_else(|| group.to_string())
+    }
+
     /// The label of a physical group; 0 is none.
     fn label(&mut self, group: i64) -> u32 {
         if let Some((known, label)) = self.last
@@ -156,52 +248,15 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         {
             return label;
         }
-        let label = match self.names.get(&group) {
-            _ if group == 0 => self.target.label(""),
-            Some(name) => self.target.label(name),
-            None => self.target.label(&group.to_string()),
+        let label = match group {
+            0 => self.target.label(""),
+            _ => self.target.label(&self.group_name(group)),
         };
         self.last = Some((group, label));
         label
     }
 
-    /// Keeps the first tetrahedron of each volume in a physical group.
-    fn solid(&mut self, kind: i64, tags: &[i64; 8], group: i64, volume: i64) -> Result<()> {
-        if self.target.cells.are_wanted() {
-            return self.cell(kind, tags, group);
-        }
-        self.n_solids += 1;
-        let is_tet = kind == 4 || kind == 11;
-        if group == 0 || !is_tet || !self.seen.insert((group, volume)) {
-            return Ok(());
-        }
-        let mut corners = [0; 4];
-        for (corner, tag) in corners.iter_mut().zip(tags) {
-            *corner = self.nodes.find(*tag, &self.numbers.feed)?;
-        }
-        let known = self.volume_names.get(&group).cloned();
-        let name = known.unwrap_or_else(|| format!("volume_{group}"));
-        self.first_tets.entry(name).or_default().push(corners);
-        Ok(())
-    }
-
-    /// Adds a solid element whose boundary is the surface.
-    fn cell(&mut self, kind: i64, tags: &[i64; 8], group: i64) -> Result<()> {
-        let n = gmsh_corners(kind, &self.numbers.feed)?;
-        let mut corners = [0; 8];
-        for (corner, tag) in corners.iter_mut().zip(&tags[..n]) {
-            *corner = self.nodes.find(*tag, &self.numbers.feed)?;
-        }
-        let known = self.volume_names.get(&group).cloned();
-        let name = known.unwrap_or_else(|| match group {
-            0 => String::new(),
-            _ => format!("volume_{group}"),
-        });
-        let (n_nodes, _) = need_element_type(kind, &self.numbers.feed)?;
-        self.target.cell(&self.numbers.feed, (&corners[..n], n_nodes), &name)
-    }
-
-    fn node(&mut self, tag: i64, p: Point) -> Result<()> {
+    pub(super) fn node(&mut self, tag: i64, p: Point) -> Result<()> {
         if !self.nodes.push(tag) {
             let found = format!("node {tag} a second time");
             let expected = "nodes of different tags".to_owned();
@@ -210,108 +265,44 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         self.numbers.feed.placed(self.target.builder.vertex(p))
     }
 
-    fn point(&mut self) -> Result<Point> {
+    pub(super) fn point(&mut self) -> Result<Point> {
         Ok(Point::new(self.numbers.double()?, self.numbers.double()?, self.numbers.double()?))
     }
 
-    fn face(&mut self, tags: &[i64], group: i64) -> Result<()> {
-        if self.target.leaves_out_face() {
+    /// Takes the nodes of an element as a face or a solid; the first ones are its corners.
+    pub(super) fn element(&mut self, kind: ElementType, tags: &[i64; 8], group: i64) -> Result<()> {
+        let ElementType { n_nodes, n_corners, role } = kind;
+        if role == Role::Thin || role == Role::Face && self.target.leaves_out_face() {
             return Ok(());
         }
-        let mut corners = [0; 4];
-        for (corner, tag) in corners.iter_mut().zip(tags) {
+        if let Some((last, of_last, known)) = &self.last_element
+            && (last.n_nodes, last.role, of_last) == (n_nodes, role, tags)
+            && *known != group
+        {
+            self.other_groups.insert(group);
+            return Ok(());
+        }
+        self.last_element = Some((kind, *tags, group));
+        let mut corners = [0; 8];
+        for (corner, tag) in corners.iter_mut().zip(&tags[..n_corners]) {
             *corner = self.nodes.find(*tag, &self.numbers.feed)?;
         }
-        let label = self.label(group);
-        self.numbers.feed.placed(self.target.builder.polygon(&corners[..tags.len()], label))
+        let corners = &corners[..n_corners];
+        if role == Role::Face {
+            self.n_curved += u64::from(n_nodes > n_corners);
+            let label = self.label(group);
+            return self.numbers.feed.placed(self.target.builder.polygon(corners, label));
+        }
+        let name = match (group, self.volume_names.get(&group)) {
+            (0, _) => String::new(),
+            (_, Some(name)) => name.clone(),
+            _ => format!("volume_{group}"),
+        };
+        if self.target.cells.are_wanted() {
+            return self.target.cell(&self.numbers.feed, (corners, n_nodes), &name);
+        }
+        self.numbers.feed.placed(self.solids.add(corners, &name, self.target))
     }
-
-    // --- 2.2 ----------------------------------------------------------------------------------
-
-    /// The count of a section of 2.2, which is text in binary files too.
-    fn text_count(&mut self, what: &'static str, words: u64, bytes: u64) -> Result<u64> {
-        let declared = self.numbers.feed.integer(what)?;
-        if self.numbers.binary {
-            self.numbers.feed.skip_line()?;
-        }
-        self.numbers.check_count(what, declared, words, bytes)
-    }
-
-    fn read_nodes_2(&mut self) -> Result<()> {
-        let n = self.text_count("nodes", 4, 7)?;
-        for i in 0..n {
-            self.numbers.need_record("nodes", n, i)?;
-            let tag = self.numbers.int()?;
-            let p = self.point()?;
-            self.node(tag, p)?;
-        }
-        self.numbers.end("$EndNodes")
-    }
-
-    fn read_elements_2_text(&mut self) -> Result<()> {
-        let n = self.text_count("elements", 4, 2)?;
-        for i in 0..n {
-            self.numbers.need_record("elements", n, i)?;
-            self.numbers.int()?;
-            let kind = self.numbers.int()?;
-            let n_tags = self.numbers.int()?;
-            self.read_element_2(kind, n_tags)?;
-        }
-        self.numbers.end("$EndElements")
-    }
-
-    fn read_elements_2_binary(&mut self) -> Result<()> {
-        let n = self.text_count("elements", 1, 4)?;
-        let mut done = 0;
-        while done < n {
-            let kind = self.numbers.int()?;
-            let in_block = self.numbers.int()?;
-            let in_block = self.numbers.check_count("elements", in_block, 1, 4)?;
-            let n_tags = self.numbers.int()?;
-            if in_block == 0 || in_block > n - done {
-                let feed = &self.numbers.feed;
-                return Err(feed.unexpected(
-                    format!("a block of 1 to {} elements", n - done),
-                    in_block.to_string().as_bytes(),
-                ));
-            }
-            for _ in 0..in_block {
-                self.numbers.int()?;
-                self.read_element_2(kind, n_tags)?;
-            }
-            done += in_block;
-        }
-        self.numbers.end("$EndElements")
-    }
-
-    /// The tags and nodes of one element.
-    fn read_element_2(&mut self, kind: i64, n_tags: i64) -> Result<()> {
-        let n_tags = self.numbers.check_count("element tags", n_tags, 1, 4)?;
-        let (mut group, mut entity) = (0, 0);
-        for i in 0..n_tags {
-            let tag = self.numbers.int()?;
-            match i {
-                0 => group = tag,
-                1 => entity = tag,
-                _ => {}
-            }
-        }
-        let (n_nodes, role) = need_element_type(kind, &self.numbers.feed)?;
-        let mut tags = [0; 8];
-        for i in 0..n_nodes {
-            let tag = self.numbers.int()?;
-            if let Some(slot) = tags.get_mut(i) {
-                *slot = tag;
-            }
-        }
-        match role {
-            Role::Face => self.face(&tags[..n_nodes], group),
-            Role::Solid => self.solid(kind, &tags, group, entity),
-            _ => Ok(()),
-        }
-    }
-
-    // --- 4.1 ----------------------------------------------------------------------------------
 
     fn read_entities(&mut self, partitioned: bool) -> Result<()> {
         let mut counts = [0; 4];
@@ -332,7 +323,8 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                     self.numbers.int()?;
                     self.int_list()?;
                 }
-                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                let is_point = dimension == 0 && self.version == Version::V41;
+                for _ in 0..if is_point { 3 } else { 6 } {
                     self.numbers.double()?;
                 }
                 let groups = self.int_list()?;
@@ -342,6 +334,9 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 };
                 if let (2.., Some(&group)) = (dimension, groups.first()) {
                     known.insert(entity, group.saturating_abs());
+                }
+                if dimension == 2 {
+                    self.other_groups.extend(groups.iter().skip(1).map(|g| g.saturating_abs()));
                 }
                 if dimension > 0 {
                     self.int_list()?;
@@ -360,20 +355,33 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         (0..n).map(|_| self.numbers.int()).collect()
     }
 
-    /// The four numbers before the blocks of a section: blocks, entries, lowest and highest tag.
+    /// The tag of a node or an element.
+    fn tag(&mut self) -> Result<i64> {
+        match self.version {
+            Version::V40 => self.numbers.int(),
+            _ => self.numbers.size(),
+        }
+    }
+
+    /// The numbers before the blocks of a section: blocks, entries, and since 4.1 lowest and highest tag.
     fn block_header(&mut self, what: &'static str, words: u64) -> Result<(u64, u64)> {
         let (n_blocks, n) = (self.numbers.size()?, self.numbers.size()?);
         let n_blocks = self.numbers.check_count("blocks", n_blocks, 4, 5)?;
         let n = self.numbers.check_count(what, n, words, 8)?;
-        self.numbers.size()?;
-        self.numbers.size()?;
+        if self.version == Version::V41 {
+            self.numbers.size()?;
+            self.numbers.size()?;
+        }
         Ok((n_blocks, n))
     }
 
     /// The numbers before one block: entity dimension, entity, a third and the number of entries.
     fn block(&mut self, what: &'static str, words: u64) -> Result<(i64, i64, i64, u64)> {
-        let (dimension, entity, third) =
+        let (mut dimension, mut entity, third) =
             (self.numbers.int()?, self.numbers.int()?, self.numbers.int()?);
+        if self.version == Version::V40 {
+            (dimension, entity) = (entity, dimension);
+        }
         let n = self.numbers.size()?;
         let n = self.numbers.check_count(what, n, words, 8)?;
         Ok((dimension, entity, third, n))
@@ -396,12 +404,17 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             let (dimension, _, parametric, n) = self.block("nodes", 4)?;
             let n_parameters = if parametric != 0 { dimension.clamp(0, 3) } else { 0 };
             tags.clear();
-            for k in 0..n {
+            // In 4.0 each tag stands before its coordinates.
+            for k in 0..if self.version == Version::V41 { n } else { 0 } {
                 self.numbers.need_record("nodes", n, k)?;
                 tags.push(self.numbers.size()?);
             }
-            for (k, &tag) in (0..).zip(&tags) {
+            for k in 0..n {
                 self.numbers.need_record("nodes", n, k)?;
+                let tag = match tags.get(k as usize) {
+                    Some(&tag) => tag,
+                    None => self.tag()?,
+                };
                 let p = self.point()?;
                 for _ in 0..n_parameters {
                     self.numbers.double()?;
@@ -420,7 +433,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         for i in 0..n_blocks {
             self.numbers.need_record("blocks", n_blocks, i)?;
             let (dimension, entity, kind, n) = self.block("elements", 2)?;
-            let (n_nodes, role) = need_element_type(kind, &self.numbers.feed)?;
+            let kind = need_element_type(kind, &self.numbers.feed)?;
             let groups = match dimension {
                 2 => Some(&self.groups),
                 3 => Some(&self.volume_groups),
@@ -430,19 +443,16 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             let is_inside = dimension == 2 && self.inside.contains(&entity);
             for k in 0..n {
                 self.numbers.need_record("elements", n, k)?;
-                self.numbers.size()?;
+                self.tag()?;
                 let mut tags = [0; 8];
-                for j in 0..n_nodes {
-                    let tag = self.numbers.size()?;
+                for j in 0..kind.n_nodes {
+                    let tag = self.tag()?;
                     if let Some(slot) = tags.get_mut(j) {
                         *slot = tag;
                     }
                 }
-                match role {
-                    Role::Face if is_inside => {}
-                    Role::Face => self.face(&tags[..n_nodes], group)?,
-                    Role::Solid => self.solid(kind, &tags, group, entity)?,
-                    _ => {}
+                if !(is_inside && kind.role == Role::Face) {
+                    self.element(kind, &tags, group)?;
                 }
             }
             found += n;

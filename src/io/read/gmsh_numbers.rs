@@ -127,62 +127,66 @@ impl NodeTags {
 /// The role of an element for a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
-    /// Flat triangles and quadrilaterals.
+    /// Triangles and quadrilaterals.
     Face,
-    /// Curved faces, which no flat triangle can stand for.
-    CurvedFace,
     Solid,
     /// Points and lines.
     Thin,
 }
 
-/// Number of nodes and role of an element type of the format.
-pub(super) fn element_type(kind: i64) -> Option<(usize, Role)> {
-    use Role::{CurvedFace, Face, Solid, Thin};
-    Some(match kind {
-        1 => (2, Thin),
-        2 => (3, Face),
-        3 => (4, Face),
-        4 => (4, Solid),
-        5 => (8, Solid),
-        6 => (6, Solid),
-        7 => (5, Solid),
-        8 => (3, Thin),
-        9 => (6, CurvedFace),
-        10 => (9, CurvedFace),
-        11 => (10, Solid),
-        12 => (27, Solid),
-        13 => (18, Solid),
-        14 => (14, Solid),
-        15 => (1, Thin),
-        16 => (8, CurvedFace),
-        17 => (20, Solid),
-        18 => (15, Solid),
-        19 => (13, Solid),
-        20 => (9, CurvedFace),
-        21 => (10, CurvedFace),
-        22 => (12, CurvedFace),
-        23 | 24 => (15, CurvedFace),
-        25 => (21, CurvedFace),
-        26 => (4, Thin),
-        27 => (5, Thin),
-        28 => (6, Thin),
-        29 => (20, Solid),
-        30 => (35, Solid),
-        31 => (56, Solid),
-        92 => (64, Solid),
-        93 => (125, Solid),
-        _ => return None,
-    })
+/// An element type: the number of its nodes and of its corners, which come first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ElementType {
+    pub n_nodes: usize,
+    pub n_corners: usize,
+    pub role: Role,
 }
 
-/// As [`element_type`]. Errors: an unknown type, a curved face.
-pub(super) fn need_element_type<R: BufRead>(kind: i64, feed: &Feed<R>) -> Result<(usize, Role)> {
-    match element_type(kind) {
-        Some((_, Role::CurvedFace)) => {
-            Err(feed.unsupported(format!("a curved face (element type {kind})")))
-        }
-        Some(found) => Ok(found),
-        None => Err(feed.unsupported(format!("element type {kind}"))),
-    }
+/// The element type of a number of the format.
+fn element_type(kind: i64) -> Option<ElementType> {
+    use Role::{Face, Solid, Thin};
+    let (n_nodes, n_corners, role) = match kind {
+        1 => (2, 2, Thin),
+        2 => (3, 3, Face),
+        3 => (4, 4, Face),
+        4 => (4, 4, Solid),
+        5 => (8, 8, Solid),
+        6 => (6, 6, Solid),
+        7 => (5, 5, Solid),
+        8 => (3, 2, Thin),
+        9 => (6, 3, Face),
+        10 => (9, 4, Face),
+        11 => (10, 4, Solid),
+        12 => (27, 8, Solid),
+        13 => (18, 6, Solid),
+        14 => (14, 5, Solid),
+        15 => (1, 1, Thin),
+        16 => (8, 4, Face),
+        17 => (20, 8, Solid),
+        18 => (15, 6, Solid),
+        19 => (13, 5, Solid),
+        20 => (9, 3, Face),
+        21 => (10, 3, Face),
+        22 => (12, 3, Face),
+        23 | 24 => (15, 3, Face),
+        25 => (21, 3, Face),
+        26 => (4, 2, Thin),
+        27 => (5, 2, Thin),
+        28 => (6, 2, Thin),
+        29 => (20, 4, Solid),
+        30 => (35, 4, Solid),
+        31 => (56, 4, Solid),
+        36 => (16, 4, Face),
+        37 => (25, 4, Face),
+        38 => (36, 4, Face),
+        92 => (64, 8, Solid),
+        93 => (125, 8, Solid),
+        _ => return None,
+    };
+    Some(ElementType { n_nodes, n_corners, role })
+}
+
+/// As [`element_type`]. Errors: an unknown type.
+pub(super) fn need_element_type<R: BufRead>(kind: i64, feed: &Feed<R>) -> Result<ElementType> {
+    element_type(kind).ok_or_else(|| feed.unsupported(format!("element type {kind}")))
 }

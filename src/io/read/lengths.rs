@@ -1,4 +1,4 @@
-//! A list of lengths from a NumPy array file: one dimension, floating point.
+//! Lengths, or points with lengths, from a NumPy array file of floating point numbers.
 //!
 //! Source: the NPY format, versions 1 to 3, of NumPy's documentation (NEP 1).
 
@@ -21,9 +21,19 @@ const HEAD_MAX: usize = 1 << 16;
 /// # Errors
 /// Another kind of file, more than one dimension, numbers other than floating point of 4 or 8 bytes; the place of a bad length.
 pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
+    read_array(path, None, limit)
+}
+
+/// Reads points with lengths above zero: rows of x, y, z and a length, one behind the other. Errors: as [`read_lengths`].
+pub(super) fn read_rows(path: &Path, limit: u64) -> Result<Vec<f64>> {
+    read_array(path, Some(4), limit)
+}
+
+/// Reads a list, or rows of a number of columns, of which the last is a length.
+fn read_array(path: &Path, columns: Option<u64>, limit: u64) -> Result<Vec<f64>> {
     let (from, length_of_file) = open_plain(path)?;
     let mut file = ArrayFile { from, name: path.display().to_string(), at: 0 };
-    let (n, kind) = file.head()?;
+    let (n, kind) = file.head(columns)?;
     let needed = n.saturating_mul(8);
     if needed > limit {
         let fault = ReadFault::TooLarge { what: "the lengths", needed, limit };
@@ -32,9 +42,14 @@ pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
     let mut lengths = Vec::with_capacity(n.min(length_of_file) as usize);
     for i in 0..n {
         let h = file.number(kind)?;
-        if !(LENGTH_MIN..1.0 / LENGTH_MIN).contains(&h) {
+        let is_length = columns.is_none_or(|columns| (i + 1) % columns == 0);
+        if is_length && !(LENGTH_MIN..1.0 / LENGTH_MIN).contains(&h) {
             let expected = format!("a length from {LENGTH_MIN:e} to {:e}", 1.0 / LENGTH_MIN);
             return Err(file.unexpected(Spot::File, &expected, format!("{h} as number {i}")));
+        }
+        if !h.is_finite() {
+            let found = format!("{h} as number {i}");
+            return Err(file.unexpected(Spot::File, "a coordinate", found));
         }
         lengths.push(h);
     }
@@ -87,8 +102,8 @@ impl ArrayFile {
         })
     }
 
-    /// Reads the head: how many numbers follow, and their kind.
-    fn head(&mut self) -> Result<(u64, NumberFormat)> {
+    /// Reads the head: how many numbers follow, and their kind. With `columns`, they are rows of so many.
+    fn head(&mut self, columns: Option<u64>) -> Result<(u64, NumberFormat)> {
         let start = self.take(8)?;
         if !start.starts_with(MAGIC) {
             let found = format!("{:x?}", &start[..6]);
@@ -117,13 +132,21 @@ impl ArrayFile {
             .map(str::trim)
             .filter(|side| !side.is_empty())
             .collect();
-        let n = match sides[..] {
-            [n] => n.parse().ok(),
+        let is_by_rows = value_of(&head, "fortran_order").as_deref() == Some("False");
+        let n = match (&sides[..], columns) {
+            ([n], None) => n.parse().ok(),
+            ([n, row], Some(columns)) if is_by_rows && row.parse() == Ok(columns) => {
+                n.parse().ok().and_then(|n: u64| n.checked_mul(columns))
+            }
             _ => None,
         };
         let n = n.ok_or_else(|| {
             let found = format!("an array of shape {shape}");
-            self.unexpected(Spot::Byte(8), "a list of one dimension", found)
+            let expected = match columns {
+                None => "a list of one dimension",
+                Some(_) => "rows of four numbers x, y, z and h, in C order",
+            };
+            self.unexpected(Spot::Byte(8), expected, found)
         })?;
         Ok((n, kind))
     }

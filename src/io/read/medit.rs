@@ -1,12 +1,12 @@
 //! MEDIT meshes, `.mesh` and `.meshb`: triangles and quadrilaterals, references as labels.
 //!
-//! Solid elements are left out with a note. One tetrahedron of each reference but 0 marks a region.
+//! Solid elements are left out with a note; tetrahedra mark regions by their references. Triangles may come before their vertices.
 
-use std::collections::BTreeMap;
 use std::io::BufRead;
 
 use super::feed::Feed;
 use super::medit_numbers::{MeditNumbers, SectionRead};
+use super::solids::Solids;
 use super::{Result, SurfaceSink};
 use tetdb_base::surface::NoteKind;
 
@@ -17,7 +17,7 @@ pub(super) fn read<R: BufRead>(
 ) -> Result<()> {
     let mut numbers = MeditNumbers::open(feed, is_binary)?;
     numbers.text_version()?;
-    let mut n_vertices = 0;
+    let (mut n_vertices, mut solids, mut has_others) = (0, Solids::default(), false);
     numbers.sections(SectionRead::Whole, |numbers, keyword| {
         match keyword {
             "dimension" => {
@@ -28,12 +28,18 @@ pub(super) fn read<R: BufRead>(
                 }
             }
             "vertices" => n_vertices += read_vertices(numbers, target)?,
-            "triangles" => read_faces::<3, _>(numbers, "triangles", n_vertices, target)?,
-            "quadrilaterals" => read_faces::<4, _>(numbers, "quadrilaterals", n_vertices, target)?,
             "tetrahedra" if target.cells.are_wanted() => {
                 read_cells::<4, _>(numbers, n_vertices, target)?;
             }
-            "tetrahedra" => read_tets(numbers, n_vertices, target)?,
+            "triangles" | "quadrilaterals" | "tetrahedra" => {
+                // Vertices still to come are checked at the end of the file.
+                let n = if n_vertices == 0 { u64::from(u32::MAX) } else { n_vertices };
+                match keyword {
+                    "triangles" => read_faces::<3, _>(numbers, "triangles", n, target)?,
+                    "tetrahedra" => read_tets(numbers, n, &mut solids, target)?,
+                    _ => read_faces::<4, _>(numbers, "quadrilaterals", n, target)?,
+                }
+            }
             "trianglesp2" | "quadrilateralsq2" => {
                 return Err(numbers.feed.unsupported("curved triangles"));
             }
@@ -44,6 +50,7 @@ pub(super) fn read<R: BufRead>(
                 if let Some(what) = solid(keyword) {
                     let n = numbers.skipped_count()?;
                     target.leave_out_cells(n);
+                    has_others |= n > 0;
                     note_skipped(what, n, target);
                 }
                 return Ok(SectionRead::Part);
@@ -51,6 +58,12 @@ pub(super) fn read<R: BufRead>(
         }
         Ok(SectionRead::Whole)
     })?;
+    target.leave_out_cells(solids.len());
+    // What other solid elements fill is not known: then the file's regions do not count.
+    match has_others {
+        true => note_skipped("tetrahedra", solids.len(), target),
+        false => solids.finish("tetrahedra", target),
+    }
     target.end_cells(&numbers.feed)?;
     numbers.feed.finish(target.builder)
 }
@@ -150,26 +163,22 @@ fn read_cells<const N: usize, R: BufRead>(
     Ok(())
 }
 
-/// Tetrahedra are left out, but for one of each reference: it marks a region.
+/// Tetrahedra are left out; their references name regions.
 fn read_tets<R: BufRead>(
     numbers: &mut MeditNumbers<R>,
     n_vertices: u64,
-    target: &mut SurfaceSink,
+    solids: &mut Solids,
+    target: &SurfaceSink,
 ) -> Result<()> {
     let n = numbers.count("tetrahedra", 0, 5)?;
-    let mut first = BTreeMap::new();
     for i in 0..n {
         numbers.feed.need_record("tetrahedra", n, i)?;
-        let corners = numbers.corners(n_vertices)?;
-        let reference = numbers.integer("a reference")?;
-        if reference != 0 {
-            first.entry(format!("ref_{reference}")).or_insert_with(|| vec![corners]);
-        }
-    }
-    target.leave_out_cells(n);
-    note_skipped("tetrahedra", n, target);
-    if n > 0 {
-        target.regions_of_mesh(&first);
+        let corners = numbers.corners::<4>(n_vertices)?;
+        let name = match numbers.integer("a reference")? {
+            0 => String::new(),
+            reference => format!("ref_{reference}"),
+        };
+        numbers.feed.placed(solids.add(&corners, &name, target))?;
     }
     Ok(())
 }

@@ -1,16 +1,20 @@
-//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen; sizes at the vertices of MEDIT meshes; files of edges and points.
+//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen, VTK, Abaqus, Nastran, I-DEAS; sizes at the vertices of
+//! meshes; files of edges and points.
 //!
 //! A declared count is compared with the length of the file before it is used; every error
 //! has its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
-//! become doubles exactly. Polygons are fanned, vertices with identical bits are one.
+//! become doubles exactly. Polygons are cut into triangles, vertices with identical bits
+//! are one.
 
 mod cells;
 mod embedded;
 mod embedded_sink;
 mod error;
 mod feed;
+mod fem;
 mod gmsh;
 mod gmsh_numbers;
+mod gmsh_old;
 mod lengths;
 mod medit;
 mod medit_numbers;
@@ -18,12 +22,17 @@ mod obj;
 mod off;
 mod open;
 mod ply;
+mod point_table;
 mod sink;
 mod sizes;
+mod solids;
 mod stl;
 mod tetgen;
 mod volume_cells;
 mod vtk;
+mod vtk_xml;
+mod words;
+mod xml;
 
 #[cfg(test)]
 mod collection;
@@ -34,13 +43,14 @@ use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 pub use cells::boundary_of;
-pub use embedded::read_wires;
+pub use embedded::{read_seeds, read_wires};
 pub use embedded_sink::WireKind;
 pub use error::{FilePlace, ReadError, ReadFault, Spot};
 use feed::{Feed, Result};
 pub use lengths::read_lengths;
 pub use open::is_stream;
-use open::{open, stem, unpacked_name};
+use open::{is_binary_stl, open, stem, unpacked_name};
+pub use point_table::{PointColumns, PointRow, PointTable};
 use sink::SurfaceSink;
 pub use sizes::{FileSizes, read_sizes, size_files};
 use volume_cells::VolumeCells;
@@ -71,6 +81,16 @@ pub enum Format {
     TetgenPoly,
     /// TetGen `.ele`, tetrahedra; their boundary is the surface.
     TetgenEle,
+    /// Legacy VTK, `.vtk`.
+    Vtk,
+    /// VTK's XML files, `.vtp` and `.vtu`.
+    VtkXml,
+    /// Abaqus, `.inp`.
+    Abaqus,
+    /// Nastran, `.nas` and `.bdf`.
+    Nastran,
+    /// I-DEAS universal file, `.unv`.
+    Unv,
 }
 
 impl Format {
@@ -89,6 +109,11 @@ impl Format {
             "smesh" => Self::TetgenSmesh,
             "poly" => Self::TetgenPoly,
             "ele" => Self::TetgenEle,
+            "vtk" => Self::Vtk,
+            "inp" => Self::Abaqus,
+            "nas" | "bdf" => Self::Nastran,
+            "unv" => Self::Unv,
+            "vtp" | "vtu" => Self::VtkXml,
             _ => return None,
         })
     }
@@ -105,7 +130,9 @@ impl Format {
         };
         if starts("ply\n") || starts("ply\r") {
             Some(Self::Ply)
-        } else if starts("$MeshFormat") {
+        } else if starts("# vtk DataFile") {
+            Some(Self::Vtk)
+        } else if starts("$MeshFormat") || starts("$NOD") {
             Some(Self::Gmsh)
         } else if starts("MeshVersionFormatted") {
             Some(Self::Medit)
@@ -119,13 +146,6 @@ impl Format {
             None
         }
     }
-}
-
-/// Returns whether a length is that of a binary STL with this head.
-fn is_binary_stl(head: &[u8], length: u64) -> bool {
-    head.get(80..84)
-        .and_then(|count| count.try_into().ok())
-        .is_some_and(|count| length == 84 + 50 * u64::from(u32::from_le_bytes(count)))
 }
 
 /// The kind of solid model, for files without triangles.
@@ -208,12 +228,12 @@ pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> 
     let mut target = SurfaceSink { builder: &mut builder, stem, prefix: None, cells };
     target.builder.begin_file(file);
     let feed = Feed::new(file, bytes, bytes.len() as u64);
-    read_feed(format, feed, None, 0, &mut target)?;
+    read_feed(format, feed, None, bytes.len() as u64 * 16, &mut target)?;
     Ok(builder.finish())
 }
 
 const UNKNOWN_FORMAT: ReadFault = ReadFault::UnknownFormat(
-    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh, .poly or .ele after what it holds, with .gz or .zst behind it where it is packed",
+    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh, .poly, .ele, .vtk, .vtp, .vtu, .inp, .nas, .bdf or .unv after what it holds, with .gz or .zst behind it where it is packed",
 );
 
 fn unique(stem: &str, taken: &[String]) -> String {
@@ -271,6 +291,11 @@ fn read_feed<R: BufRead>(
         Format::Gmsh => gmsh::read(feed, target),
         Format::TetgenEle => cells::read_ele(feed, nodes, limit, target),
         Format::TetgenSmesh => tetgen::read(feed, tetgen::FacetLayout::Smesh, nodes, limit, target),
+        Format::Vtk => vtk::read_surface(feed, target),
+        Format::Abaqus => fem::read_abaqus(feed, target),
+        Format::Nastran => fem::read_nastran(feed, target),
+        Format::Unv => fem::read_unv(feed, target),
+        Format::VtkXml => vtk_xml::read(feed, limit, target),
         Format::TetgenPoly => tetgen::read(feed, tetgen::FacetLayout::Poly, nodes, limit, target),
     }
 }

@@ -1,7 +1,7 @@
 //! Wavefront OBJ: `v` and `f` lines; groups, objects or materials as labels.
 //!
 //! A face names vertices from 1, or backwards from the last one as −1. Texture and normal numbers after slashes are skipped. A backslash
-//! continues a line.
+//! continues a line, `#` begins a comment; names of groups may have one.
 
 use std::io::BufRead;
 
@@ -75,7 +75,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                     return Err(unexpected(&place, "a face of at least 3 corners", &line));
                 }
                 let label = *label.get_or_insert_with(|| target.label(names.best()));
-                feed.placed(target.builder.polygon(&corners, label))?;
+                let added = target.builder.polygon(&corners, label);
+                added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
             }
             b"l" | b"p" => n_lines_points += 1,
             word if names.take(word, &line) => label = None,
@@ -98,8 +99,10 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     feed.finish(target.builder)
 }
 
+/// The words of a line before a comment.
 fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let all = line.split(u8::is_ascii_whitespace);
+    let text = line.split(|&b| b == b'#').next().unwrap_or_default();
+    let all = text.split(u8::is_ascii_whitespace);
     all.filter(|w| !w.is_empty())
 }
 

@@ -53,8 +53,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         for _ in 0..n {
             corners.push(feed.index(0, n_vertices)?);
         }
-        feed.skip_line()?;
         feed.placed(target.builder.polygon(&corners, label))?;
+        feed.skip_line()?;
     }
     feed.finish(target.builder)
 }

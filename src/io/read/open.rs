@@ -1,7 +1,7 @@
 //! Files opened for a reader: plain ones as they are, packed ones and pipes unpacked in memory, within a limit.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read};
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use super::error::{FilePlace, ReadError, ReadFault};
@@ -9,11 +9,17 @@ use super::feed::{self, Feed, Result};
 
 /// Bytes of the read buffer of one file.
 const BUFFER_BYTES: usize = 256 << 10;
+/// Bytes at the beginning of a file that show its encoding.
+const HEAD_BYTES: usize = 4096;
 /// Largest window of a zstd frame, as a power of 2: 32 MiB, which is more than ordinary levels need.
 const WINDOW_LOG_MAX: u32 = 25;
 
-/// A file of any kind, to be read once.
-pub(super) type Reader = Box<dyn BufRead>;
+/// A reader that can go back.
+pub(super) trait ReadSeek: BufRead + Seek {}
+impl<T: BufRead + Seek> ReadSeek for T {}
+
+/// A file of any kind.
+pub(super) type Reader = Box<dyn ReadSeek>;
 
 /// How the bytes of a file are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,10 +68,67 @@ fn is_pipe(_: &std::fs::Metadata) -> bool {
     false
 }
 
-/// Opens a regular file, plain or packed, or a pipe. Packed and piped files are held unpacked, in at most `limit` bytes.
+/// Opens a regular file, plain or packed, or a pipe. Packed and piped files are held unpacked, in at most `limit` bytes; so is text
+/// in UTF-16, which becomes UTF-8, and text whose lines end in CR alone.
 pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
+    let (mut reader, length) = open_bytes(path, limit)?;
+    let head = reader.fill_buf().map_err(|e| unreadable(path, e))?;
+    let head = &head[..head.len().min(HEAD_BYTES)];
     let name = path.to_string_lossy();
-    let unpack: Reader = match packing(path) {
+    let is_plain = is_binary_stl(head, length);
+    let has_mark = head.starts_with(b"\xef\xbb\xbf");
+    let from_bytes = match utf16(head) {
+        Some(order) if !is_plain => Some(order),
+        _ => None,
+    };
+    let is_cr = !is_plain && ends_lines_in_cr(head);
+    if from_bytes.is_none() && !is_cr {
+        let mut feed = Feed::new(&name, reader, length);
+        if has_mark && !is_plain {
+            feed.skip_mark();
+        }
+        return Ok(feed);
+    }
+    let mut bytes = within(reader, path, limit / 2)?;
+    if let Some(order) = from_bytes {
+        let pairs = bytes.chunks(2).map(|b| order([b[0], *b.get(1).unwrap_or(&0)]));
+        let text: String = (char::decode_utf16(pairs))
+            .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
+            .filter(|&c| c != '\u{feff}')
+            .collect();
+        bytes = text.into_bytes();
+    }
+    if ends_lines_in_cr(&bytes[..bytes.len().min(HEAD_BYTES)]) {
+        bytes.iter_mut().filter(|b| **b == b'\r').for_each(|b| *b = b'\n');
+    }
+    let length = bytes.len() as u64;
+    let mut feed = Feed::<Reader>::new(&name, Box::new(Cursor::new(bytes)), length);
+    if has_mark {
+        feed.skip_mark();
+    }
+    Ok(feed)
+}
+
+/// The byte order of a text in UTF-16, by its mark or by its first two characters.
+fn utf16(head: &[u8]) -> Option<fn([u8; 2]) -> u16> {
+    let is_letter = |b: u8| b.is_ascii_graphic() || b == b' ';
+    match *head {
+        [0xff, 0xfe, ..] => Some(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => Some(u16::from_be_bytes),
+        [a, 0, b, 0, ..] if is_letter(a) && is_letter(b) => Some(u16::from_le_bytes),
+        [0, a, 0, b, ..] if is_letter(a) && is_letter(b) => Some(u16::from_be_bytes),
+        _ => None,
+    }
+}
+
+/// Returns whether the beginning of a file is text whose lines end in CR alone.
+fn ends_lines_in_cr(head: &[u8]) -> bool {
+    head.contains(&b'\r') && head.iter().all(|&b| b >= b' ' || matches!(b, b'\r' | b'\t'))
+}
+
+/// The bytes of a file, unpacked, and their number.
+fn open_bytes(path: &Path, limit: u64) -> Result<(Reader, u64)> {
+    let unpack: Box<dyn BufRead> = match packing(path) {
         Some((Compression::Gzip, _)) => {
             let (reader, _) = open_plain(path)?;
             Box::new(BufReader::new(flate2::bufread::MultiGzDecoder::new(reader)))
@@ -85,16 +148,16 @@ pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
         }
         None => {
             let (reader, length) = open_plain(path)?;
-            return Ok(Feed::new(&name, Box::new(reader), length));
+            return Ok((Box::new(reader), length));
         }
     };
     let bytes = within(unpack, path, limit)?;
     let length = bytes.len() as u64;
-    Ok(Feed::new(&name, Box::new(Cursor::new(bytes)), length))
+    Ok((Box::new(Cursor::new(bytes)), length))
 }
 
 /// All bytes, unless they are more than `limit`.
-fn within(from: Reader, path: &Path, limit: u64) -> Result<Vec<u8>> {
+fn within(from: impl Read, path: &Path, limit: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let read = from.take(limit.saturating_add(1)).read_to_end(&mut bytes);
     read.map_err(|e| unreadable(path, e))?;
@@ -121,4 +184,11 @@ pub(super) fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
 
 fn unreadable(path: &Path, reason: impl ToString) -> ReadError {
     FilePlace::new(path).refuse(ReadFault::Unreadable(reason.to_string()))
+}
+
+/// Returns whether a length is that of a binary STL with this head.
+pub(super) fn is_binary_stl(head: &[u8], length: u64) -> bool {
+    head.get(80..84)
+        .and_then(|count| count.try_into().ok())
+        .is_some_and(|count| length == 84 + 50 * u64::from(u32::from_le_bytes(count)))
 }

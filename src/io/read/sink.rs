@@ -1,7 +1,5 @@
 //! The target of readers of triangles.
 
-use std::collections::BTreeMap;
-
 use super::volume_cells::VolumeCells;
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceBuilder, VolumePoints};
@@ -29,14 +27,15 @@ impl SurfaceSink<'_> {
         }
     }
 
-    /// Names the region around `point`.
-    pub(super) fn region(&mut self, point: Point, name: &str) {
+    /// Names the region around `point`; returns the name with its prefix.
+    pub(super) fn region(&mut self, point: Point, name: &str) -> String {
         let name = match &self.prefix {
             None => name.to_owned(),
             Some(prefix) => format!("{prefix}:{name}"),
         };
-        let kind = SeedKind::Region(Some(name));
+        let kind = SeedKind::Region(Some(name.clone()));
         self.builder.seed(Seed { point, kind });
+        name
     }
 
     /// Notes the number of points that mark holes or regions.
@@ -44,19 +43,5 @@ impl SurfaceSink<'_> {
         if n > 0 {
             self.builder.note(NoteKind::VolumePoints { points, n });
         }
-    }
-
-    /// Names the regions of a mesh of tetrahedra, each at the centroid of one of its tetrahedra.
-    pub(super) fn regions_of_mesh(&mut self, first: &BTreeMap<String, Vec<[u32; 4]>>) {
-        let mut n = 0;
-        for (name, tets) in first {
-            for corners in tets {
-                if let Some(middle) = self.builder.middle(*corners) {
-                    self.region(middle, name);
-                    n += 1;
-                }
-            }
-        }
-        self.note_points(VolumePoints::Regions, n);
     }
 }

@@ -27,6 +27,11 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Resul
     if solid && !head[..n_head].contains(&0) {
         return read_text(feed, target);
     }
+    // More bytes that are no records: other programs take them for a remark.
+    if n > 0 && feed.len > expected && !(feed.len - expected).is_multiple_of(RECORD) {
+        target.builder.note(NoteKind::TrailingBytes { n: feed.len - expected });
+        return read_binary(feed, n, target);
+    }
     Err(wrong_length(feed, n_head, n, expected))
 }
 

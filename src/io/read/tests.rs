@@ -1,11 +1,13 @@
 //! Every format on small made inputs: the good, the odd and the bad.
 
+mod fem;
 mod gmsh;
 mod indexed;
 mod medit;
 mod ply;
 mod stl;
 mod tetgen;
+mod vtk;
 
 use super::*;
 use gmsh::{MSH2, MSH4};

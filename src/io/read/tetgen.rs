@@ -1,14 +1,16 @@
 //! TetGen `.smesh` and `.poly`, with the points in the file or in the `.node` file beside it.
 //!
-//! Each polygon is fanned on its own. A facet of several polygons or with holes is noted, and overlapping polygons are found by validation.
-//! Points that mark holes and regions of the volume become seeds; a region gets the name `attribute_N` of its attribute.
+//! A facet is what its polygons enclose, without the parts around its hole points. Polygons of two corners are edges to embed.
+//! Points that mark holes and regions of the volume become seeds; a region gets the name `attribute_N` of its attribute, and a
+//! length from its largest volume.
 
+use std::collections::HashSet;
 use std::io::BufRead;
 use std::path::Path;
 
 use super::embedded_sink::EmbeddedSink;
 use super::feed::{Feed, name, parse};
-use super::{ReadFault, Result, SurfaceSink, open};
+use super::{FilePlace, ReadFault, Result, SurfaceSink, open};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceError, VolumePoints};
 
@@ -42,20 +44,32 @@ pub(super) fn read<R: BufRead>(
     };
     let n_facets = feed.count("facets", 4)?;
     feed.skip_line()?;
-    let mut n_split = 0;
+    let (mut n_cut, mut n_edges) = (0, 0);
     for i in 0..n_facets {
         feed.need_record("facets", n_facets, i)?;
+        let place = feed.place();
         match kind {
             FacetLayout::Smesh => {
                 let corners = read_polygon(&mut feed, numbering)?;
+                if corners.len() < 3 {
+                    return Err(feed.unsupported(format!("a polygon of {} corners", corners.len())));
+                }
                 let marker = rest_of_line(&mut feed)?.pop().unwrap_or(0);
                 add(&feed, &corners, marker, target)?;
             }
-            FacetLayout::Poly => n_split += u64::from(read_facet(&mut feed, numbering, target)?),
+            FacetLayout::Poly => {
+                let facet = read_facet(&mut feed, numbering)?;
+                n_edges +=
+                    facet.polygons.iter().filter(|polygon| polygon.len() == 2).count() as u64;
+                n_cut += u64::from(add_facet(&place, &facet, target)?);
+            }
         }
     }
-    if n_split > 0 {
-        target.builder.note(NoteKind::SplitFacets { n: n_split });
+    if n_cut > 0 {
+        target.builder.note(NoteKind::CutFacets { n: n_cut });
+    }
+    if n_edges > 0 {
+        target.builder.note(NoteKind::Edges { n: n_edges });
     }
     for points in [VolumePoints::Holes, VolumePoints::Regions] {
         read_volume_points(&mut feed, points, target)?;
@@ -85,13 +99,44 @@ fn read_volume_points<R: BufRead>(
                     true => name(feed.word()),
                     false => "0".to_owned(),
                 };
-                target.region(point, &format!("attribute_{attribute}"));
+                let name = target.region(point, &format!("attribute_{attribute}"));
+                if feed.next_word_in_line()? {
+                    let volume: f64 = feed.parse("the largest volume of a tetrahedron")?;
+                    ask_volume(feed, name, volume, target)?;
+                }
             }
         }
         feed.skip_line()?;
     }
     target.note_points(points, n);
+    if n > 0 {
+        target.builder.fill_rest();
+    }
     Ok(())
+}
+
+/// Asks for the edges of regular tetrahedra of a volume in a region; none is asked for by volumes of zero and less.
+fn ask_volume<R: BufRead>(
+    feed: &Feed<R>,
+    name: String,
+    volume: f64,
+    target: &mut SurfaceSink,
+) -> Result<()> {
+    let h = (72f64.sqrt() * volume).cbrt();
+    let known = target.builder.region_sizes().iter().find(|(of, _)| *of == name);
+    match known.map(|(_, known)| *known) {
+        _ if h.is_nan() => Err(feed.unexpected("a volume", feed.word())),
+        _ if h <= 0.0 => Ok(()),
+        Some(known) if known == h => Ok(()),
+        Some(_) => {
+            let what = format!("another largest volume for a second region {name}");
+            Err(feed.unsupported(what))
+        }
+        None => {
+            target.builder.region_size(name, h);
+            Ok(())
+        }
+    }
 }
 
 pub(super) fn read_node_file<R: BufRead>(
@@ -133,6 +178,17 @@ pub(super) fn read_nodes<R: BufRead>(feed: &mut Feed<R>, sink: &mut EmbeddedSink
     }
 }
 
+/// The number of the first point of a `.node` file, and all positions.
+pub(super) fn read_positions<R: BufRead>(mut feed: Feed<R>) -> Result<(i64, Vec<Point>)> {
+    feed.comment = Some(b'#');
+    let mut points = Vec::new();
+    let numbering = read_points(&mut feed, |p, _| {
+        points.push(p);
+        Ok(())
+    })?;
+    Ok((numbering.map_or(0, |numbering| numbering.first), points))
+}
+
 /// The facets of two corners in a `.poly` file, called by their markers.
 pub(super) fn read_segments<R: BufRead>(
     mut feed: Feed<R>,
@@ -153,23 +209,16 @@ pub(super) fn read_segments<R: BufRead>(
     };
     let n_facets = feed.count("facets", 4)?;
     feed.skip_line()?;
+    let mut known = HashSet::new();
     for i in 0..n_facets {
         feed.need_record("facets", n_facets, i)?;
-        let n_polygons = feed.count("polygons", 4)?;
-        let rest = rest_of_line(&mut feed)?;
-        let label = marker_name(rest.get(1).copied().unwrap_or(0));
-        for _ in 0..n_polygons {
-            let n = feed.count("corners", 2)?;
-            let corners = (0..n).map(|_| feed.index(numbering.first, numbering.n));
-            let corners = corners.collect::<Result<Vec<u32>>>()?;
-            if n == 2 {
-                let label = sink.label(&label);
-                feed.placed(sink.line(&corners, label))?;
+        let facet = read_facet(&mut feed, numbering)?;
+        for edge in facet.polygons.iter().filter(|polygon| polygon.len() == 2) {
+            // Facets that meet in an edge may both have it.
+            if known.insert([edge[0].min(edge[1]), edge[0].max(edge[1])]) {
+                let label = sink.label(&marker_name(facet.marker));
+                feed.placed(sink.line(edge, label))?;
             }
-        }
-        for _ in 0..rest.first().copied().unwrap_or(0) {
-            feed.need_word("a hole of the facet")?;
-            feed.skip_line()?;
         }
     }
     Ok(())
@@ -242,8 +291,8 @@ fn read_points<R: BufRead>(
 /// A polygon: the number of corners and the corners.
 fn read_polygon<R: BufRead>(feed: &mut Feed<R>, numbering: Numbering) -> Result<Vec<u32>> {
     let n = feed.count("corners", 2)?;
-    if n < 3 {
-        return Err(feed.unsupported(format!("a polygon of {n} corners")));
+    if n == 0 {
+        return Err(feed.unsupported("a polygon without corners"));
     }
     (0..n).map(|_| feed.index(numbering.first, numbering.n)).collect()
 }
@@ -270,31 +319,51 @@ fn add<R: BufRead>(
     feed.placed(target.builder.polygon(corners, label))
 }
 
-/// One facet of a `.poly`; true when it is more than one polygon.
-fn read_facet<R: BufRead>(
-    feed: &mut Feed<R>,
-    numbering: Numbering,
-    target: &mut SurfaceSink,
-) -> Result<bool> {
+/// One facet of a `.poly`.
+struct Facet {
+    polygons: Vec<Vec<u32>>,
+    holes: Vec<Point>,
+    marker: i64,
+}
+
+fn read_facet<R: BufRead>(feed: &mut Feed<R>, numbering: Numbering) -> Result<Facet> {
     let n_polygons = feed.count("polygons", 4)?;
     let rest = rest_of_line(feed)?;
     let (n_holes, marker) = (rest.first().copied().unwrap_or(0), rest.get(1).copied().unwrap_or(0));
     let n_holes = feed.check_count("holes of a facet", n_holes, 6)?;
+    let mut facet = Facet { polygons: Vec::new(), holes: Vec::new(), marker };
     for i in 0..n_polygons {
         feed.need_record("polygons", n_polygons, i)?;
-        let corners = read_polygon(feed, numbering)?;
+        facet.polygons.push(read_polygon(feed, numbering)?);
         rest_of_line(feed)?;
-        add(feed, &corners, marker, target)?;
     }
     for _ in 0..n_holes {
         feed.need_word("a hole of the facet")?;
         let _: i64 = feed.parse("a hole number")?;
-        feed.point()?;
+        facet.holes.push(feed.point()?);
         feed.skip_line()?;
     }
     if n_polygons == 0 {
         let (expected, found) = ("at least one polygon".to_owned(), "none".to_owned());
         return Err(feed.refuse(ReadFault::Unexpected { expected, found }));
     }
-    Ok(n_polygons > 1 || n_holes > 0)
+    Ok(facet)
+}
+
+/// Adds the triangles of a facet; true when it is more than one polygon.
+fn add_facet(place: &FilePlace, facet: &Facet, target: &mut SurfaceSink) -> Result<bool> {
+    let most = facet.polygons.iter().map(Vec::len).max().unwrap_or(0);
+    match (most, facet.holes.is_empty()) {
+        (1, _) => return Err(place.refuse(ReadFault::Unsupported("a facet of points".to_owned()))),
+        (2, true) => return Ok(false),
+        (2, false) => {
+            let what = "a facet of edges with holes".to_owned();
+            return Err(place.refuse(ReadFault::Unsupported(what)));
+        }
+        _ => {}
+    }
+    let label = target.label(&marker_name(facet.marker));
+    let added = target.builder.facet(&facet.polygons, &facet.holes, label);
+    added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
+    Ok(facet.polygons.len() > 1 || !facet.holes.is_empty())
 }

@@ -1,13 +1,14 @@
-//! Legacy VTK files, text or binary, of versions 2 to 5.1: points with line and vertex cells.
+//! Legacy VTK files, text or binary, of versions 2 to 5.1: points with polygons, flat cells, lines and vertices.
 //!
 //! Source: the file formats chapter of the VTK user's guide. What is binary is big-endian.
 
 use std::io::BufRead;
 
-use super::ReadError;
 use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::feed::{Feed, Result};
+use super::{ReadError, ReadFault, SurfaceSink};
 use tetdb_base::geom::Point;
+use tetdb_base::surface::{NoteKind, SurfaceError};
 
 /// Kinds of cells with one vertex or several, and lines of two or more.
 const VERTEX: i64 = 1;
@@ -26,6 +27,118 @@ struct Vtk<R> {
     n_points: u64,
 }
 
+/// What points are read into.
+trait Target {
+    fn point(&mut self, p: Point) -> std::result::Result<(), SurfaceError>;
+    fn check_bytes(&self, more: u64) -> std::result::Result<(), SurfaceError>;
+}
+
+impl Target for EmbeddedSink {
+    fn point(&mut self, p: Point) -> std::result::Result<(), SurfaceError> {
+        self.point(p)
+    }
+
+    fn check_bytes(&self, more: u64) -> std::result::Result<(), SurfaceError> {
+        self.check_bytes(more)
+    }
+}
+
+impl Target for SurfaceSink<'_> {
+    fn point(&mut self, p: Point) -> std::result::Result<(), SurfaceError> {
+        self.builder.vertex(p)
+    }
+
+    fn check_bytes(&self, more: u64) -> std::result::Result<(), SurfaceError> {
+        self.builder.check_more(more)
+    }
+}
+
+/// The role of a cell for a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Shape {
+    /// A face of that many corners, which come first; 0 for all vertices.
+    Face(usize),
+    /// A quadrilateral whose corners run along rows.
+    Pixel,
+    Strip,
+    /// Points and lines.
+    Thin,
+    Solid,
+}
+
+/// The role of a type of cell of VTK; `None` for one that is not known.
+pub(super) fn shape(kind: i64) -> Option<Shape> {
+    Some(match kind {
+        VERTEX..=POLY_LINE | 21 | 35 => Shape::Thin,
+        6 => Shape::Strip,
+        5 | 22 | 34 | 69 => Shape::Face(3),
+        7 => Shape::Face(0),
+        8 => Shape::Pixel,
+        9 | 23 | 28 | 30 | 70 => Shape::Face(4),
+        10..=14 | 24..=27 | 29 | 31..=33 | 37 | 41 | 42 | 71..=74 => Shape::Solid,
+        _ => return None,
+    })
+}
+
+/// Counts of cells that are not taken as they are.
+#[derive(Default)]
+pub(super) struct CellCounts {
+    n_solids: u64,
+    n_thin: u64,
+    n_curved: u64,
+}
+
+impl CellCounts {
+    /// Adds the triangles of a cell.
+    pub fn add(
+        &mut self,
+        cell: &[u32],
+        shape: Option<Shape>,
+        label: u32,
+        target: &mut SurfaceSink,
+    ) -> std::result::Result<(), ReadFault> {
+        let added = match (shape, cell) {
+            (Some(Shape::Face(n)), _) if cell.len() >= n.max(3) => {
+                self.n_curved += u64::from(n > 0 && cell.len() > n);
+                let n = if n == 0 { cell.len() } else { n };
+                target.builder.polygon(&cell[..n], label)
+            }
+            (Some(Shape::Pixel), &[a, b, c, d]) => target.builder.polygon(&[a, b, d, c], label),
+            (Some(Shape::Strip), _) => cell.windows(3).enumerate().try_for_each(|(k, t)| {
+                let corners = if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] };
+                target.builder.triangle(corners, label)
+            }),
+            (Some(Shape::Thin), _) => {
+                self.n_thin += 1;
+                Ok(())
+            }
+            (Some(Shape::Solid), _) => {
+                self.n_solids += 1;
+                Ok(())
+            }
+            (None, _) => return Err(ReadFault::Unsupported("a cell of this type".to_owned())),
+            _ => {
+                let (expected, found) =
+                    ("a face of its corners", format!("{} vertices", cell.len()));
+                return Err(ReadFault::Unexpected { expected: expected.to_owned(), found });
+            }
+        };
+        added.map_err(ReadFault::Surface)
+    }
+
+    /// Notes what was left out or taken as flat.
+    pub fn note(&self, target: &mut SurfaceSink) {
+        for (what, n) in [("solid elements", self.n_solids), ("lines and points", self.n_thin)] {
+            if n > 0 {
+                target.builder.note(NoteKind::SkippedElements { what, n });
+            }
+        }
+        if self.n_curved > 0 {
+            target.builder.note(NoteKind::CurvedFaces { n: self.n_curved });
+        }
+    }
+}
+
 /// Reads the lines or the vertices among the cells.
 pub(super) fn read<R: BufRead>(
     feed: Feed<R>,
@@ -33,59 +146,92 @@ pub(super) fn read<R: BufRead>(
     sink: &mut EmbeddedSink,
 ) -> Result<()> {
     let mut vtk = Vtk { feed, is_binary: false, n_points: 0 };
-    let mut line = Vec::new();
-    vtk.feed.read_line(&mut line)?;
-    if !line.starts_with(b"# vtk DataFile Version") {
-        return Err(vtk.feed.unexpected("`# vtk DataFile Version`", &line));
-    }
-    vtk.feed.skip_line()?;
-    vtk.feed.need_word("ASCII or BINARY")?;
-    vtk.is_binary = match vtk.feed.word() {
-        b"ASCII" => false,
-        b"BINARY" => true,
-        word => return Err(vtk.feed.unexpected("ASCII or BINARY", word)),
-    };
-    vtk.feed.need_keyword("DATASET")?;
-    vtk.feed.need_word("POLYDATA or UNSTRUCTURED_GRID")?;
-    if ![&b"POLYDATA"[..], b"UNSTRUCTURED_GRID"].contains(&vtk.feed.word()) {
-        return Err(vtk.feed.unexpected("POLYDATA or UNSTRUCTURED_GRID", vtk.feed.word()));
-    }
-    let (mut lines, mut vertices, mut mixed) = (Cells::new(), Cells::new(), Cells::new());
-    while vtk.feed.next_word()? {
-        match vtk.feed.word() {
-            b"POINTS" => vtk.points(sink)?,
-            b"LINES" => lines = vtk.cells(sink)?,
-            b"VERTICES" => vertices = vtk.cells(sink)?,
-            b"CELLS" => mixed = vtk.cells(sink)?,
-            b"POLYGONS" | b"TRIANGLE_STRIPS" => drop(vtk.cells(sink)?),
-            b"METADATA" => vtk.skip_metadata()?,
-            b"CELL_TYPES" => {
-                let n = vtk.feed.count("cell types", 1)?;
-                vtk.begin_data()?;
-                for k in 0..n as usize {
-                    let cell = mixed.get(k).cloned().unwrap_or_default();
-                    match vtk.integer(b"int")? {
-                        LINE | POLY_LINE => lines.push(cell),
-                        VERTEX | POLY_VERTEX => vertices.push(cell),
-                        _ => {}
-                    }
-                }
-            }
-            // Values at points and cells follow.
-            b"POINT_DATA" | b"CELL_DATA" | b"FIELD" => break,
-            word => {
-                return Err(vtk.feed.unexpected("POINTS, LINES, VERTICES or CELLS", word));
-            }
-        }
-    }
     let label = sink.label("");
-    vtk.feed.placed(match kind {
-        WireKind::Edges => lines.iter().try_for_each(|line| sink.line(line, label)),
-        WireKind::Points => (vertices.iter().flatten()).try_for_each(|&v| sink.mark(v, label)),
-    })
+    for (cell, kind_of_cell) in vtk.read_cells(sink)? {
+        vtk.feed.placed(match (kind, kind_of_cell) {
+            (WireKind::Edges, LINE | POLY_LINE) => sink.line(&cell, label),
+            (WireKind::Points, VERTEX | POLY_VERTEX) => {
+                cell.iter().try_for_each(|&v| sink.mark(v, label))
+            }
+            _ => Ok(()),
+        })?;
+    }
+    Ok(())
+}
+
+/// Reads polygons, strips and flat cells.
+pub(super) fn read_surface<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
+    let mut vtk = Vtk { feed, is_binary: false, n_points: 0 };
+    let cells = vtk.read_cells(target)?;
+    let label = target.label("");
+    let mut counts = CellCounts::default();
+    for (n, (cell, kind)) in cells.into_iter().enumerate() {
+        let added = counts.add(&cell, shape(kind), label, target);
+        added
+            .map_err(|fault| match fault {
+                ReadFault::Unsupported(what) => {
+                    ReadFault::Unsupported(format!("{what} ({kind}, cell {n})"))
+                }
+                fault => fault,
+            })
+            .map_err(|fault| vtk.feed.refuse(fault))?;
+    }
+    counts.note(target);
+    vtk.feed.finish(target.builder)
 }
 
 impl<R: BufRead> Vtk<R> {
+    /// Reads a file: points into `target`, and returns all cells with their types.
+    fn read_cells(&mut self, target: &mut impl Target) -> Result<Vec<(Vec<u32>, i64)>> {
+        let mut line = Vec::new();
+        self.feed.read_line(&mut line)?;
+        if !line.starts_with(b"# vtk DataFile Version") {
+            return Err(self.feed.unexpected("`# vtk DataFile Version`", &line));
+        }
+        self.feed.skip_line()?;
+        self.feed.need_word("ASCII or BINARY")?;
+        self.is_binary = match self.feed.word() {
+            b"ASCII" => false,
+            b"BINARY" => true,
+            word => return Err(self.feed.unexpected("ASCII or BINARY", word)),
+        };
+        self.feed.need_keyword("DATASET")?;
+        self.feed.need_word("POLYDATA or UNSTRUCTURED_GRID")?;
+        if ![&b"POLYDATA"[..], b"UNSTRUCTURED_GRID"].contains(&self.feed.word()) {
+            return Err(self.feed.unexpected("POLYDATA or UNSTRUCTURED_GRID", self.feed.word()));
+        }
+        let (mut cells, mut mixed) = (Vec::new(), Cells::new());
+        while self.feed.next_word()? {
+            let of_kind = |list: Cells, kind: i64| list.into_iter().map(move |cell| (cell, kind));
+            match self.feed.word() {
+                b"POINTS" => self.points(target)?,
+                b"LINES" => cells.extend(of_kind(self.cells(target)?, POLY_LINE)),
+                b"VERTICES" => cells.extend(of_kind(self.cells(target)?, POLY_VERTEX)),
+                b"POLYGONS" => cells.extend(of_kind(self.cells(target)?, 7)),
+                b"TRIANGLE_STRIPS" => cells.extend(of_kind(self.cells(target)?, 6)),
+                b"CELLS" => mixed = self.cells(target)?,
+                b"METADATA" => self.skip_metadata()?,
+                b"CELL_TYPES" => {
+                    let n = self.feed.count("cell types", 1)?;
+                    if n != mixed.len() as u64 {
+                        let found = format!("{} cells", mixed.len());
+                        return Err(self.feed.miscounted("cell types", n, found));
+                    }
+                    self.begin_data()?;
+                    for cell in std::mem::take(&mut mixed) {
+                        cells.push((cell, self.integer(b"int")?));
+                    }
+                }
+                // Values at points and cells follow.
+                b"POINT_DATA" | b"CELL_DATA" | b"FIELD" => break,
+                word => {
+                    return Err(self.feed.unexpected("POINTS, LINES, VERTICES or CELLS", word));
+                }
+            }
+        }
+        Ok(cells)
+    }
+
     /// Begins a list of numbers: binary ones begin after the end of the line.
     fn begin_data(&mut self) -> Result<()> {
         if self.is_binary {
@@ -110,7 +256,7 @@ impl<R: BufRead> Vtk<R> {
         }
     }
 
-    fn points(&mut self, sink: &mut EmbeddedSink) -> Result<()> {
+    fn points(&mut self, sink: &mut impl Target) -> Result<()> {
         self.n_points = self.feed.count("points", 6)?;
         self.feed.need_word("the type of coordinates")?;
         let kind = self.feed.word().to_vec();
@@ -130,7 +276,7 @@ impl<R: BufRead> Vtk<R> {
     }
 
     /// Cells: each with its number of vertices before them, or, since version 5.1, offsets and then all vertices.
-    fn cells(&mut self, sink: &EmbeddedSink) -> Result<Cells> {
+    fn cells(&mut self, sink: &impl Target) -> Result<Cells> {
         let n = self.feed.integer("the number of cells")?;
         let size = self.feed.integer("how many numbers follow")?;
         let n = self.feed.check_count("cells", n, 1)?;

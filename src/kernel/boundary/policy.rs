@@ -23,6 +23,8 @@ pub enum RegionPolicy {
     ByOrientation,
     /// Regions with a seed; where only holes are given, all others.
     Seeds,
+    /// Every bounded region without a hole. Holes outside change nothing.
+    AllButHoles,
 }
 
 impl Word for RegionPolicy {
@@ -32,6 +34,7 @@ impl Word for RegionPolicy {
         (Self::Outer, "outer"),
         (Self::ByOrientation, "by-orientation"),
         (Self::Seeds, "seeds"),
+        (Self::AllButHoles, "all-but-holes"),
     ];
 }
 
@@ -54,7 +57,7 @@ impl RegionPolicy {
         let all: BTreeSet<u32> = (outside + 1..end).collect();
         let mut all_instead_of_parity = false;
         let volumes = match self {
-            Self::All => all,
+            Self::All | Self::AllButHoles => all,
             Self::Seeds => BTreeSet::new(),
             Self::Outer => {
                 let outer = walls.keys().filter(|&&(low, _)| low == outside);

@@ -16,12 +16,14 @@ pub struct RegionRule {
     pub seeds: Vec<Seed>,
     /// Named seeds of the surface's files; those that lie in no filled region are ignored.
     pub names: Vec<Seed>,
+    /// The policy was asked for; else seeds of the surface's files may decide it.
+    pub is_given: bool,
 }
 
 impl From<RegionPolicy> for RegionRule {
     fn from(policy: RegionPolicy) -> Self {
         let (seeds, names) = (Vec::new(), Vec::new());
-        Self { policy, seeds, names }
+        Self { policy, seeds, names, is_given: true }
     }
 }
 
@@ -42,6 +44,9 @@ impl RegionRule {
         for seed in &self.seeds {
             let volume = volume_of(seed.point);
             if volume == outside {
+                if (self.policy, &seed.kind) == (RegionPolicy::AllButHoles, &SeedKind::Hole) {
+                    continue;
+                }
                 return Err(wrong(seed, "lies outside of all volumes"));
             }
             let of_kind = match seed.kind {

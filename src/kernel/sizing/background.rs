@@ -1,4 +1,4 @@
-//! Sizes from a background mesh: linear in its tetrahedra, none outside of it.
+//! Sizes from a background mesh: linear in its tetrahedra, none outside of it. Without tetrahedra, those of the nearest point.
 
 use super::SizingError;
 use super::constraint::SizeConstraint;
@@ -92,8 +92,43 @@ impl BackgroundMesh {
         [low, high]
     }
 
-    /// The size at `p`, if a tetrahedron holds it.
+    /// The size at the vertex nearest to `p`.
+    fn nearest(&self, p: Point) -> Option<f64> {
+        let distance = |b: &Aabb| p.distance_squared(p.clamp(b.low, b.high));
+        let mut best: Option<(f64, u32)> = None;
+        let top = self.vertices.levels.len() - 1;
+        let mut stack: Vec<(f64, usize, usize)> =
+            (0..self.vertices.levels[top].len()).map(|n| (0.0, top, n)).collect();
+        while let Some((least, level, node)) = stack.pop() {
+            if best.is_some_and(|(known, _)| least > known) {
+                continue;
+            }
+            if level > 0 {
+                let children = self.vertices.children(level, node);
+                let child = |n| (distance(&self.vertices.levels[level - 1].get(n)), level - 1, n);
+                let from = stack.len();
+                stack.extend(children.map(child));
+                // The nearest one is looked at first.
+                stack[from..].sort_by(|a, b| b.0.total_cmp(&a.0));
+                continue;
+            }
+            for i in self.vertices.members(node) {
+                let v = self.vertices.order.get(i);
+                let found = (p.distance_squared(self.points[v as usize]), v);
+                // Of vertices at one distance the first: the size depends on no order of the tree.
+                if best.is_none_or(|known| found < known) {
+                    best = Some(found);
+                }
+            }
+        }
+        best.map(|(_, v)| self.h[v as usize])
+    }
+
+    /// The size at `p`: of the tetrahedron that holds it, if any, or without tetrahedra of the nearest vertex.
     fn at(&self, p: Point) -> Option<f64> {
+        if self.tets.is_empty() {
+            return self.nearest(p);
+        }
         let mut found = None;
         self.tree.at(p, |t| {
             let tet = self.tets[t as usize];
@@ -197,6 +232,25 @@ mod tests {
             let outside = mesh.h(p + Point::new(1.001, 0.0, 0.0));
             assert_eq!(outside, Ok(f64::INFINITY));
         }
+    }
+
+    #[test]
+    fn without_tetrahedra_the_nearest_point_has_the_size() {
+        let at = |k: usize, step: usize| (k * step % 97) as f64 / 96.0;
+        let points: Vec<Point> =
+            (0..300).map(|k| Point::new(at(k, 7), at(k, 31), at(k, 57))).collect();
+        let h: Vec<f64> = (0..300).map(|k| 0.01 + 0.001 * k as f64).collect();
+        let sizes = BackgroundMesh::new(points.clone(), Vec::new(), h.clone());
+        for k in 0..500 {
+            let p = Point::new(at(k, 11), at(k, 3), at(k, 5)) * 1.3 - 0.1;
+            let nearest = (0..300).min_by(|&a, &b| {
+                points[a].distance_squared(p).total_cmp(&points[b].distance_squared(p))
+            });
+            assert_eq!(sizes.h(p), Ok(h[nearest.expect("there are points")]));
+        }
+        let one = BackgroundMesh::new(vec![Point::ONE], Vec::new(), vec![0.25]);
+        assert_eq!(one.h(Point::ZERO), Ok(0.25));
+        assert_eq!(one.divides(Point::ZERO, 0.4), Some(false));
     }
 
     #[test]

@@ -247,7 +247,8 @@ fn notes(chosen: &Filled, options: &Options, n: u32) -> Vec<String> {
     if !chosen.names.is_empty() && unnamed > 0 {
         notes.push(format!("{unnamed} of {filled} filled regions have no name"));
     }
-    if options.mesh.regions.policy == RegionPolicy::Seeds && empty > 0 {
+    let policy = options.mesh.regions.policy;
+    if matches!(policy, RegionPolicy::Seeds | RegionPolicy::AllButHoles) && empty > 0 {
         notes.push(format!("{empty} of {n} regions stay empty: no seed is inside, or a hole"));
     }
     notes

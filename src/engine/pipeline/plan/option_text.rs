@@ -171,6 +171,7 @@ impl OptionsText {
         let usual = if seeds.is_empty() { RegionPolicy::Parity } else { RegionPolicy::Seeds };
         Ok(RegionRule {
             policy: word("regions", &self.regions, usual)?,
+            is_given: self.regions.is_some() || !seeds.is_empty(),
             seeds,
             names: self.region_name.iter().map(region).collect::<Result<_, _>>()?,
         })

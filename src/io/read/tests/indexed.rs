@@ -58,9 +58,9 @@ fn off_good_and_bad() {
 
 #[test]
 fn polygons_are_fans_and_equal_points_are_one() {
-    let text = "OFF\n6 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n-0 0 0\n7 7 7\n5 4 1 2 3 0\n";
+    let text = "OFF\n6 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n-0 0 0\n7 7 7\n4 4 1 2 3\n";
     let surface = read(Format::Off, text).unwrap();
-    assert_eq!(surface.triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 0]]);
+    assert_eq!(surface.triangles, [[0, 1, 2], [0, 2, 3]]);
     assert_eq!(surface.n_vertices(), 4);
     let kinds: Vec<&NoteKind> = surface.notes.iter().map(|n| &n.kind).collect();
     let (welded, fanned) = (NoteKind::WeldedVertices { n: 1 }, NoteKind::FannedPolygons { n: 1 });
@@ -78,6 +78,8 @@ fn obj_good_and_bad() {
         Format::Obj,
         format!("vt 0 0\n{}{vertices}", faces.replace(" 3//7", " \\\n 3")),
     );
+    let noted = body.replace("//7\n", "//7 # x 9\n").replace("0\n", "0 # 7\n");
+    read_tetrahedron(Format::Obj, noted.replacen("f 1", "f 1# ", 0));
     let named = faces.replacen("f ", "o box\nusemtl red\nf ", 1).replacen("f 1", "g lid\nf 1", 1);
     let surface = read_tetrahedron(Format::Obj, format!("{vertices}{named}"));
     assert_eq!(
@@ -93,4 +95,61 @@ fn obj_good_and_bad() {
     assert_eq!(bad("v 1 0", "v nan 0"), ("not-a-number", Spot::Line(2)));
     assert_eq!(bad("v 1 0 0", "v 1 0"), ("unexpected-text", Spot::Line(2)));
     assert_eq!(refuse(Format::Obj, vertices), ("empty-surface", Spot::File));
+}
+
+#[test]
+fn polygons_with_dents_are_cut_in_every_format_and_bad_ones_have_a_line() {
+    // A prism over an L, a corner in line in its long side.
+    let base = [[0, 0], [2, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]];
+    let at = |v: usize| [base[v % 7][0], base[v % 7][1], (v / 7) as i32];
+    let mut faces: Vec<Vec<usize>> = vec![(0..7).rev().collect(), (7..14).collect()];
+    faces.extend((0..7).map(|k| vec![k, (k + 1) % 7, (k + 1) % 7 + 7, k + 7]));
+    let row = |list: &[usize], from: usize| {
+        list.iter().map(|v| (v + from).to_string()).collect::<Vec<_>>().join(" ")
+    };
+    let points: Vec<String> = (0..14).map(|v| at(v).map(|x| x.to_string()).join(" ")).collect();
+    let lines = |from: usize, count: bool| -> String {
+        let line = |f: &Vec<usize>| match count {
+            true => format!("{} {}\n", f.len(), row(f, from)),
+            false => format!("f {}\n", row(f, from)),
+        };
+        faces.iter().map(line).collect()
+    };
+    let vertices: String = points.iter().map(|p| format!("v {p}\n")).collect();
+    let list = points.join("\n");
+    let numbered: String = (0..14).map(|v| format!("{} {}\n", v + 1, points[v])).collect();
+    let poly: String = faces.iter().map(|f| format!("1\n{} {}\n", f.len(), row(f, 1))).collect();
+    let files = [
+        (Format::Obj, format!("{vertices}{}", lines(1, false))),
+        (Format::Obj, format!("{}{vertices}", lines(1, false))),
+        (Format::Off, format!("OFF\n14 9 0\n{list}\n{}", lines(0, true))),
+        (
+            Format::Ply,
+            format!(
+                "ply\nformat ascii 1.0\nelement vertex 14\nproperty double x\nproperty double y\nproperty double z\n\
+                 element face 9\nproperty list uchar int vertex_indices\nend_header\n{list}\n{}",
+                lines(0, true)
+            ),
+        ),
+        (Format::TetgenPoly, format!("14 3\n{numbered}9 0\n{poly}0\n0\n")),
+        (Format::TetgenSmesh, format!("14 3\n{numbered}9 0\n{}0\n0\n", lines(1, true))),
+    ];
+    for (format, text) in files {
+        let surface = read(format, &text).unwrap_or_else(|e| panic!("{format:?}: {e}"));
+        assert_eq!(surface.n_triangles(), 2 * 5 + 7 * 2, "{format:?}");
+        assert!(tetdb_base::surface::validate(&surface).accept().is_ok(), "{format:?}");
+        let is_cut = |kind| surface.notes.iter().any(|n| n.kind == kind);
+        assert!(is_cut(NoteKind::CutPolygons { n: 2 }), "{format:?}: {:?}", surface.notes);
+        assert!(is_cut(NoteKind::FannedPolygons { n: 7 }), "{format:?}");
+    }
+    for (face, code) in [
+        ("f 1 3 4 2", "self-intersection"),
+        ("f 1 2 3 3", "degenerate-triangle"),
+        ("f 1 2 3 -14", "degenerate-triangle"),
+        ("f 1 2 3 2", "degenerate-triangle"),
+        ("f 1 4 2 3", "self-intersection"),
+    ] {
+        let text = format!("{vertices}f 1 2 9\n{face}\n");
+        assert_eq!(refuse(Format::Obj, &text), (code, Spot::Line(16)), "{face}");
+    }
 }

@@ -13,6 +13,12 @@ fn medit_text() {
         (vec!["7".into(), "9".into()], vec![0, 0, 1, 1])
     );
     assert_eq!(surface.notes[0].kind, NoteKind::SkippedElements { what: "tetrahedra", n: 1 });
+    let (head, rest) = MEDIT.split_at(MEDIT.find("Vertices").unwrap());
+    let (vertices, rest) = rest.split_at(rest.find("Edges").unwrap());
+    let late = format!("{head}{}{vertices}End\n", rest.replace("End\n", ""));
+    assert_eq!(read_tetrahedron(Format::Medit, &late).seeds.len(), 1);
+    let (code, _) = refuse(Format::Medit, late.replacen("2 3 4 7", "2 3 5 7", 1));
+    assert_eq!(code, "index-out-of-range");
     let bad = |from: &str, to: &str| refuse(Format::Medit, MEDIT.replacen(from, to, 1));
     assert_eq!(bad("2 3 4 7", "2 3 5 7"), ("index-out-of-range", Spot::Line(13)));
     assert_eq!(bad("2 3 4 7", "2 3 0 7"), ("index-out-of-range", Spot::Line(13)));

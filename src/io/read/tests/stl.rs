@@ -87,3 +87,15 @@ fn bad_stl() {
         "coordinate-range"
     );
 }
+
+#[test]
+fn bytes_behind_the_triangles_are_noted() {
+    for n in [1, 7, 137] {
+        let bytes = [stl_binary(b"by a scanner"), vec![b' '; n]].concat();
+        let surface = read_tetrahedron(Format::Stl, bytes);
+        assert_eq!(surface.notes[0].kind, NoteKind::TrailingBytes { n: n as u64 });
+    }
+    // Whole records behind the declared ones contradict the number.
+    let bytes = [stl_binary(b"by a scanner"), vec![0; 100]].concat();
+    assert_eq!(refuse(Format::Stl, bytes).0, "count-mismatch");
+}

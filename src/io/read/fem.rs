@@ -1,0 +1,464 @@
+//! Faces and nodes of files of finite elements: Abaqus `.inp`, Nastran `.nas` and `.bdf`, I-DEAS `.unv`.
+//!
+//! Each reads shells, membranes and flat elements as faces; curved ones by their corners. Solid elements name regions, beams are left
+//! out with a note. What would move nodes, such as other coordinate systems, is refused.
+
+use std::collections::HashMap;
+use std::io::BufRead;
+
+use super::feed::{Feed, Result, name, parse, quote};
+use super::gmsh_numbers::NodeTags;
+use super::solids::Solids;
+use super::{FilePlace, ReadError, ReadFault, SurfaceSink};
+use tetdb_base::geom::Point;
+use tetdb_base::surface::NoteKind;
+
+/// A file being read.
+struct Elements<'a, 'b> {
+    target: &'a mut SurfaceSink<'b>,
+    nodes: NodeTags,
+    /// Vertices of the file before the nodes of this part.
+    first: u32,
+    solids: Solids,
+    n_thin: u64,
+    n_curved: u64,
+    /// Faces to come with the place that names them, for files with elements before nodes or groups.
+    faces: Vec<(i64, Vec<i64>, String, FilePlace)>,
+}
+
+fn unexpected(place: &FilePlace, expected: &str, found: impl AsRef<[u8]>) -> ReadError {
+    let (expected, found) = (expected.to_owned(), quote(found.as_ref()));
+    place.refuse(ReadFault::Unexpected { expected, found })
+}
+
+fn unsupported(place: &FilePlace, what: impl Into<String>) -> ReadError {
+    place.refuse(ReadFault::Unsupported(what.into()))
+}
+
+impl<'a, 'b> Elements<'a, 'b> {
+    fn new(target: &'a mut SurfaceSink<'b>) -> Self {
+        Self {
+            target,
+            nodes: NodeTags::default(),
+            first: 0,
+            solids: Solids::default(),
+            n_thin: 0,
+            n_curved: 0,
+            faces: Vec::new(),
+        }
+    }
+
+    fn node(&mut self, tag: i64, xyz: [f64; 3], place: &FilePlace) -> Result<()> {
+        if !self.nodes.push(tag) {
+            return Err(unexpected(place, "nodes of different numbers", tag.to_string()));
+        }
+        let p = Point::from_array(xyz);
+        super::feed::check_point(p, place)?;
+        let added = self.target.builder.vertex(p);
+        added.map_err(|source| place.refuse(ReadFault::Surface(source)))
+    }
+
+    fn corners(&self, tags: &[i64], place: &FilePlace) -> Result<Vec<u32>> {
+        let find = |&tag: &i64| {
+            let known = self.nodes.get(tag).map(|v| v + self.first);
+            known.ok_or_else(|| unexpected(place, "the number of a node", tag.to_string()))
+        };
+        tags.iter().map(find).collect()
+    }
+
+    /// Keeps a face until all nodes are known.
+    fn face(&mut self, id: i64, tags: &[i64], n_nodes: usize, label: String, place: &FilePlace) {
+        self.n_curved += u64::from(n_nodes > tags.len());
+        self.faces.push((id, tags.to_vec(), label, place.clone()));
+    }
+
+    /// Adds the faces kept so far; `label_of` may replace the label of an element.
+    fn take_faces(&mut self, label_of: impl Fn(i64) -> Option<String>) -> Result<()> {
+        for (id, tags, label, place) in std::mem::take(&mut self.faces) {
+            let corners = self.corners(&tags, &place)?;
+            let label = self.target.label(&label_of(id).unwrap_or(label));
+            let added = self.target.builder.polygon(&corners, label);
+            added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
+        }
+        Ok(())
+    }
+
+    fn solid(&mut self, tags: &[i64], name: &str, place: &FilePlace) -> Result<()> {
+        let corners = self.corners(tags, place)?;
+        let added = self.solids.add(&corners, name, self.target);
+        added.map_err(|source| place.refuse(ReadFault::Surface(source)))
+    }
+
+    /// An element of Abaqus: its number and its nodes.
+    fn abaqus_element(
+        &mut self,
+        text: &str,
+        kind: &str,
+        set: &str,
+        place: &FilePlace,
+    ) -> Result<()> {
+        let words = text.split(',').filter(|w| !w.trim().is_empty());
+        let tags = words.map(|w| whole(w, place)).collect::<Result<Vec<i64>>>()?;
+        let (id, tags) = tags.split_first().ok_or_else(|| unexpected(place, "an element", text))?;
+        let is = |prefixes: &[&str]| prefixes.iter().any(|p| kind.starts_with(p));
+        let n = tags.len();
+        if is(&["C3D", "DC3D", "AC3D"]) {
+            let corners = match n {
+                4 | 10 => 4,
+                5 | 13 => 5,
+                6 | 15 => 6,
+                8 | 20 | 27 => 8,
+                _ => return Err(unexpected(place, "a solid element of that type", kind)),
+            };
+            self.solid(&tags[..corners], set, place)?;
+        } else if is(&[
+            "T2D", "T3D", "B2", "B3", "PIPE", "CONN", "SPRING", "MASS", "ROTARY", "DASH", "GAP",
+            "R2D", "RB",
+        ]) {
+            self.n_thin += 1;
+        } else if is(&["S", "DS", "R3D", "M3D", "CPS", "CPE", "F3D"]) {
+            let corners = match n {
+                3 | 6 | 7 => 3,
+                4 | 8 | 9 => 4,
+                _ => return Err(unexpected(place, "3, 4, 6, 8 or 9 nodes", text)),
+            };
+            self.face(*id, &tags[..corners], n, set.to_owned(), place);
+        } else {
+            return Err(unsupported(place, format!("the element type {}", quote(kind.as_bytes()))));
+        }
+        Ok(())
+    }
+
+    fn finish<R: BufRead>(self, feed: &Feed<R>) -> Result<()> {
+        if self.n_thin > 0 {
+            let what = "beams and points";
+            self.target.builder.note(NoteKind::SkippedElements { what, n: self.n_thin });
+        }
+        if self.n_curved > 0 {
+            self.target.builder.note(NoteKind::CurvedFaces { n: self.n_curved });
+        }
+        self.solids.finish("solid elements", self.target);
+        feed.finish(self.target.builder)
+    }
+}
+
+/// A real number, also with `d` for the exponent or, in Nastran, with nothing between.
+fn real(text: &str, place: &FilePlace) -> Result<f64> {
+    let text = text.trim().to_ascii_lowercase().replace('d', "e");
+    let signed = text.rfind(['+', '-']).filter(|&k| k > 0 && !text[..k].ends_with('e'));
+    let number = match signed {
+        Some(k) if !text.contains('e') => format!("{}e{}", &text[..k], &text[k..]).parse(),
+        _ => text.parse(),
+    };
+    let number = number.ok().filter(|x: &f64| x.is_finite());
+    number.ok_or_else(|| super::feed::not_a_number(place, "a coordinate", text.as_bytes()))
+}
+
+fn whole(text: &str, place: &FilePlace) -> Result<i64> {
+    let number = parse(text.trim().as_bytes());
+    number.ok_or_else(|| unexpected(place, "a whole number", text))
+}
+
+/// The next line that is no comment, and its place.
+fn line<R: BufRead>(feed: &mut Feed<R>, comment: &str) -> Result<Option<(String, FilePlace)>> {
+    let mut bytes = Vec::new();
+    loop {
+        let place = feed.place();
+        bytes.clear();
+        if !feed.read_line(&mut bytes)? {
+            return Ok(None);
+        }
+        let text = String::from_utf8_lossy(&bytes).trim_end().to_owned();
+        if !text.trim().is_empty() && !text.starts_with(comment) {
+            return Ok(Some((text, place)));
+        }
+    }
+}
+
+/// Reads an input deck of Abaqus: `*NODE` and `*ELEMENT`; the element set of a block is its label.
+pub(super) fn read_abaqus<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
+    let mut mesh = Elements::new(target);
+    let (mut keyword, mut kind, mut set) = (String::new(), String::new(), String::new());
+    let (mut n_parts, mut n_instances, mut n_sets) = (0, 0, 0);
+    while let Some((mut text, place)) = line(&mut feed, "**")? {
+        if text.starts_with('*') {
+            let mut words = text.split(',').map(str::trim);
+            keyword = words.next().unwrap_or_default().to_ascii_uppercase();
+            let options: Vec<(String, &str)> = words
+                .filter_map(|w| w.split_once('='))
+                .map(|(key, value)| (key.trim().to_ascii_uppercase(), value.trim()))
+                .collect();
+            let option = |key: &str| options.iter().find(|o| o.0 == key).map(|o| o.1.to_owned());
+            match keyword.as_str() {
+                "*ELEMENT" => {
+                    kind = option("TYPE").unwrap_or_default().to_ascii_uppercase();
+                    set = option("ELSET").unwrap_or_default();
+                }
+                "*PART" => {
+                    mesh.take_faces(|_| None)?;
+                    n_parts += 1;
+                    mesh.nodes = NodeTags::default();
+                    mesh.first = mesh.target.builder.n_file_vertices() as u32;
+                }
+                "*INSTANCE" => n_instances += 1,
+                "*ELSET" => n_sets += 1,
+                "*INCLUDE" | "*SYSTEM" | "*NGEN" | "*NFILL" | "*ELGEN" | "*NCOPY" | "*ELCOPY" => {
+                    return Err(unsupported(&place, format!("the keyword {keyword}")));
+                }
+                "*NODE" if option("SYSTEM").is_some_and(|s| !s.eq_ignore_ascii_case("R")) => {
+                    return Err(unsupported(&place, "nodes in a coordinate system of their own"));
+                }
+                _ => {}
+            }
+            if n_instances > n_parts.max(1) {
+                return Err(unsupported(&place, "a part with several instances"));
+            }
+            continue;
+        }
+        match keyword.as_str() {
+            "*INSTANCE" => return Err(unsupported(&place, "an instance that is moved")),
+            "*NODE" => {
+                let words: Vec<&str> = text.split(',').collect();
+                let mut xyz = [0.0; 3];
+                for (k, x) in xyz.iter_mut().enumerate() {
+                    let word = words.get(k + 1).map(|w| w.trim()).filter(|w| !w.is_empty());
+                    *x = word.map_or(Ok(0.0), |w| real(w, &place))?;
+                }
+                mesh.node(whole(words[0], &place)?, xyz, &place)?;
+            }
+            "*ELEMENT" => {
+                while text.ends_with(',') {
+                    let Some((more, _)) = line(&mut feed, "**")? else {
+                        return Err(feed.truncated("more nodes of the element"));
+                    };
+                    text += &more;
+                }
+                mesh.abaqus_element(&text, &kind, &set, &place)?;
+            }
+            _ => {}
+        }
+    }
+    mesh.take_faces(|_| None)?;
+    if n_sets > 0 {
+        let what = "element sets of their own (those of *ELEMENT are labels)";
+        mesh.target.builder.note(NoteKind::SkippedElements { what, n: n_sets });
+    }
+    mesh.finish(&feed)
+}
+
+/// The fields of a bulk data card: between commas, or 8 or 16 characters wide.
+fn fields(text: &str) -> Vec<String> {
+    if text.contains(',') {
+        return text.split(',').take(9).map(|f| f.trim().to_owned()).collect();
+    }
+    let text = text.replace('\t', "        ");
+    let bytes = text.as_bytes();
+    let cut = |from: usize, to: usize| {
+        let part = bytes.get(from.min(bytes.len())..to.min(bytes.len())).unwrap_or_default();
+        String::from_utf8_lossy(part).trim().to_owned()
+    };
+    let first = cut(0, 8);
+    let width = if first.ends_with('*') || first.starts_with('*') { 16 } else { 8 };
+    let rest = (0..64 / width).map(|k| cut(8 + k * width, 8 + (k + 1) * width));
+    std::iter::once(first).chain(rest).collect()
+}
+
+/// Reads bulk data of Nastran: `GRID` and shells, in every field format; the property of an element is its label.
+pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
+    let mut mesh = Elements::new(target);
+    let mut solids = Vec::new();
+    let mut next = line(&mut feed, "$")?;
+    while let Some((text, place)) = next {
+        next = line(&mut feed, "$")?;
+        let mut card = fields(&text);
+        let kind = card[0].trim_end_matches('*').to_ascii_uppercase();
+        if kind == "ENDDATA" {
+            break;
+        }
+        if kind == "INCLUDE" || text.trim_start().to_ascii_uppercase().starts_with("INCLUDE ") {
+            return Err(unsupported(&place, "INCLUDE"));
+        }
+        while let Some((more, _)) = &next
+            && (more.starts_with(['+', '*', ' ', ',', '\t']))
+        {
+            // A line has 8 fields of 8 characters, or 4 of 16.
+            let n_fields = if card[0].ends_with('*') { 4 } else { 8 };
+            card.resize((card.len() - 1).next_multiple_of(n_fields) + 1, String::new());
+            card.extend(fields(more).into_iter().skip(1));
+            next = line(&mut feed, "$")?;
+        }
+        card[0] = kind;
+        let field = |k: usize| card.get(k).map_or("", String::as_str);
+        let n_corners = match card[0].as_str() {
+            "GRID" => {
+                if !["", "0"].contains(&field(2)) {
+                    return Err(unsupported(&place, "a GRID in a coordinate system of its own"));
+                }
+                let x =
+                    |k: usize| if field(k).is_empty() { Ok(0.0) } else { real(field(k), &place) };
+                mesh.node(whole(field(1), &place)?, [x(3)?, x(4)?, x(5)?], &place)?;
+                0
+            }
+            "CTRIA3" | "CTRIAR" | "CTRIA6" => 3,
+            "CQUAD4" | "CQUADR" | "CQUAD8" => 4,
+            kind if kind.starts_with("CTRI") || kind.starts_with("CQUAD") => {
+                return Err(unsupported(&place, format!("the element {kind}")));
+            }
+            "CTETRA" => -4,
+            "CPENTA" => -6,
+            "CPYRAM" => -5,
+            "CHEXA" => -8,
+            "CBAR" | "CBEAM" | "CROD" | "CONM2" | "CELAS2" | "CBUSH" | "CONROD" => {
+                mesh.n_thin += 1;
+                0
+            }
+            _ => 0i32,
+        };
+        let tags = (0..n_corners.unsigned_abs() as usize).map(|k| whole(field(3 + k), &place));
+        let tags = tags.collect::<Result<Vec<i64>>>()?;
+        let property = field(2).to_owned();
+        if n_corners > 0 {
+            let id = whole(field(1), &place)?;
+            let n_nodes =
+                if ["CTRIA6", "CQUAD8"].contains(&card[0].as_str()) { 8 } else { tags.len() };
+            mesh.face(id, &tags, n_nodes, property, &place);
+        } else if n_corners < 0 {
+            solids.push((tags, format!("property_{property}"), place));
+        }
+    }
+    mesh.take_faces(|_| None)?;
+    for (tags, name, place) in solids {
+        mesh.solid(&tags, &name, &place)?;
+    }
+    mesh.finish(&feed)
+}
+
+/// Reads a universal file of I-DEAS: nodes (2411, 781), elements (2412) and groups of elements, which are labels.
+pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
+    let mut mesh = Elements::new(target);
+    let mut groups: HashMap<i64, String> = HashMap::new();
+    let mut solids = Vec::new();
+    while let Some((mark, place)) = line(&mut feed, "\0")? {
+        if mark.trim() != "-1" {
+            return Err(unexpected(&place, "-1 before a data set", mark));
+        }
+        let Some((kind, _)) = line(&mut feed, "\0")? else {
+            break;
+        };
+        let mut rows = Vec::new();
+        loop {
+            match line(&mut feed, "\0")? {
+                Some((text, _)) if text.trim() == "-1" => break,
+                Some(row) => rows.push(row),
+                None => return Err(feed.truncated("-1 behind a data set")),
+            }
+        }
+        let mut rows = rows.into_iter();
+        match kind.trim() {
+            "2411" | "781" => {
+                while let (Some((head, place)), Some((xyz, second))) = (rows.next(), rows.next()) {
+                    let tag = numbers(&head, &place)?.first().copied().unwrap_or(0);
+                    let xyz = xyz
+                        .split_whitespace()
+                        .map(|w| real(w, &second))
+                        .collect::<Result<Vec<f64>>>()?;
+                    let xyz = xyz
+                        .try_into()
+                        .map_err(|_| unexpected(&second, "three coordinates", "others"))?;
+                    mesh.node(tag, xyz, &place)?;
+                }
+            }
+            "2412" => {
+                unv_elements(&mut mesh, rows, &mut solids)?;
+            }
+            "2467" | "2477" | "2452" | "2435" | "2432" | "2430" => {
+                while let (Some((head, place)), Some((title, _))) = (rows.next(), rows.next()) {
+                    let n = numbers(&head, &place)?.last().copied().unwrap_or(0);
+                    let mut words = Vec::new();
+                    while (words.len() as i64) < 4 * n {
+                        let Some((row, place)) = rows.next() else { break };
+                        words.extend(numbers(&row, &place)?);
+                    }
+                    // Kind 8 is an element.
+                    for entry in words.chunks_exact(4).filter(|entry| entry[0] == 8) {
+                        groups.entry(entry[1]).or_insert_with(|| name(title.as_bytes()));
+                    }
+                }
+            }
+            "2420" => {
+                // Coordinate systems: only one whose matrix is that of the global axes leaves nodes in place.
+                let rows: Vec<_> = rows.collect();
+                let values = rows.iter().skip(3).flat_map(|(text, _)| text.split_whitespace());
+                let axes: Vec<f64> = values
+                    .take(12)
+                    .filter_map(|w| w.to_ascii_lowercase().replace('d', "e").parse().ok())
+                    .collect();
+                let is_global = axes
+                    .iter()
+                    .enumerate()
+                    .all(|(k, x)| *x == f64::from(u8::from(k < 9 && k % 4 == 0)));
+                if !is_global {
+                    return Err(unsupported(&place, "a coordinate system of its own (2420)"));
+                }
+            }
+            _ => {}
+        }
+    }
+    mesh.take_faces(|id| groups.get(&id).cloned())?;
+    for (id, tags, place) in solids {
+        mesh.solid(&tags, groups.get(&id).map_or("", String::as_str), &place)?;
+    }
+    mesh.finish(&feed)
+}
+
+fn numbers(text: &str, place: &FilePlace) -> Result<Vec<i64>> {
+    text.split_whitespace().map(|w| whole(w, place)).collect()
+}
+
+/// A line of a file and its place.
+type Row = (String, FilePlace);
+
+/// The elements of data set 2412; solid ones go to `solids`.
+fn unv_elements(
+    mesh: &mut Elements,
+    mut rows: impl Iterator<Item = Row>,
+    solids: &mut Vec<(i64, Vec<i64>, FilePlace)>,
+) -> Result<()> {
+    while let Some((head, place)) = rows.next() {
+        let [id, kind, .., n] = numbers(&head, &place)?[..] else {
+            return Err(unexpected(&place, "the head of an element", head));
+        };
+        if matches!(kind, 21..=24) {
+            rows.next();
+        }
+        let mut tags = Vec::new();
+        while (tags.len() as i64) < n {
+            let Some((row, place)) = rows.next() else {
+                return Err(unexpected(
+                    &place,
+                    "the nodes of the element",
+                    "the end of the data set",
+                ));
+            };
+            tags.extend(numbers(&row, &place)?);
+        }
+        // The nodes of a curved face run around it: every second one is a corner.
+        let corners = |step: usize| tags.iter().copied().step_by(step).collect::<Vec<i64>>();
+        match (kind, tags.len()) {
+            (41 | 51 | 61 | 71 | 74 | 81 | 91, 3) | (44 | 54 | 64 | 84 | 94, 4) => {
+                mesh.face(id, &tags, tags.len(), String::new(), &place);
+            }
+            (42 | 52 | 62 | 72 | 82 | 92, 6) | (45 | 55 | 65 | 75 | 85 | 95, 8) => {
+                mesh.face(id, &corners(2), tags.len(), String::new(), &place);
+            }
+            (111, 4) | (112, 6) | (115, 8) => solids.push((id, tags, place)),
+            (118, 10) => solids.push((id, vec![tags[0], tags[2], tags[4], tags[9]], place)),
+            (11 | 21..=24 | 31 | 32 | 121..=171, _) => mesh.n_thin += 1,
+            _ => {
+                let what = format!("element type {kind} of {} nodes", tags.len());
+                return Err(unsupported(&place, what));
+            }
+        }
+    }
+    Ok(())
+}
