@@ -137,6 +137,11 @@ pub enum NoteKind {
         /// Number of polygons.
         n: u64,
     },
+    /// Corners of polygons that repeat the corner before were left out.
+    RepeatedCorners {
+        /// Number of polygons.
+        n: u64,
+    },
     /// Polygons with dents or with corners in line were cut otherwise.
     CutPolygons {
         /// Number of polygons.
@@ -221,6 +226,9 @@ impl fmt::Display for Note {
             }
             NoteKind::FannedPolygons { n } => {
                 write!(f, "{n} polygons were cut into triangles from their first vertex")
+            }
+            NoteKind::RepeatedCorners { n } => {
+                write!(f, "{n} polygons repeat a corner, which was left out")
             }
             NoteKind::CutPolygons { n } => {
                 write!(

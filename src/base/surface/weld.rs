@@ -29,6 +29,8 @@ pub struct SurfaceBuilder {
     n_fanned: u64,
     /// Those of them that are no fan from their first corner.
     n_cut: u64,
+    /// Number of polygons with corners that repeat the one before.
+    n_repeated: u64,
     /// First triangle and corners of each polygon of this file that came before its vertices.
     uncut: Vec<[u32; 2]>,
     /// Triangles of this file are given by position, not by the file's vertex numbers.
@@ -78,7 +80,8 @@ impl SurfaceBuilder {
         let surface = &self.surface;
         self.before = [surface.points.len(), surface.notes.len(), surface.seeds.len()];
         self.file2vert.clear();
-        (self.n_welded, self.n_fanned, self.n_cut, self.by_position) = (0, 0, 0, false);
+        (self.n_welded, self.n_fanned, self.n_cut, self.n_repeated) = (0, 0, 0, 0);
+        self.by_position = false;
         self.uncut.clear();
         self.surface
             .files
@@ -166,8 +169,16 @@ impl SurfaceBuilder {
     /// no area.
     pub fn polygon(&mut self, corners: &[u32], label: u32) -> Result<(), SurfaceError> {
         debug_assert!(corners.len() >= 3);
+        let kept = self.without_repeats(corners);
+        let (corners, is_edge) = match &kept {
+            Some(kept) if kept.len() > 2 => (&kept[..], false),
+            // Degenerate triangles, which validation reports and repair drops.
+            Some(_) => (corners, true),
+            None => (corners, false),
+        };
+        self.n_repeated += u64::from(kept.is_some() && !is_edge);
         let mut other = None;
-        if corners.len() > 3 {
+        if corners.len() > 3 && !is_edge {
             self.n_fanned += 1;
             match self.cut(corners) {
                 None => {
@@ -230,6 +241,19 @@ impl SurfaceBuilder {
             triangles.map(|t| t.into_iter().map(|t| t.map(|k| corners[k as usize])).collect())
         });
         Some(cut.map_err(|reason| SurfaceError::Polygon { reason, points }))
+    }
+
+    /// The corners of a polygon of more than three without those that repeat the corner before; `None` where none does.
+    fn without_repeats(&self, corners: &[u32]) -> Option<Vec<u32>> {
+        let vert = |v: u32| self.file2vert.get(v as usize);
+        let is_same = |a: u32, b: u32| a == b || vert(a).is_some() && vert(a) == vert(b);
+        let before = |k: usize| corners[(k + corners.len() - 1) % corners.len()];
+        let is_kept = |&k: &usize| !is_same(corners[k], before(k));
+        let n = corners.len();
+        if n < 4 || (0..n).all(|k| is_kept(&k)) {
+            return None;
+        }
+        Some((0..n).filter(is_kept).map(|k| corners[k]).collect())
     }
 
     /// Positions of vertices of the file, if all are known.
@@ -354,6 +378,9 @@ impl SurfaceBuilder {
         }
         if self.n_welded > 0 {
             self.note(NoteKind::WeldedVertices { n: self.n_welded });
+        }
+        if self.n_repeated > 0 {
+            self.note(NoteKind::RepeatedCorners { n: self.n_repeated });
         }
         if self.n_cut > 0 {
             self.note(NoteKind::CutPolygons { n: self.n_cut });

@@ -144,12 +144,32 @@ fn polygons_with_dents_are_cut_in_every_format_and_bad_ones_have_a_line() {
     }
     for (face, code) in [
         ("f 1 3 4 2", "self-intersection"),
-        ("f 1 2 3 3", "degenerate-triangle"),
-        ("f 1 2 3 -14", "degenerate-triangle"),
         ("f 1 2 3 2", "degenerate-triangle"),
         ("f 1 4 2 3", "self-intersection"),
     ] {
         let text = format!("{vertices}f 1 2 9\n{face}\n");
         assert_eq!(refuse(Format::Obj, &text), (code, Spot::Line(16)), "{face}");
+    }
+}
+
+#[test]
+fn corners_that_repeat_the_one_before_are_left_out() {
+    let vertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\n";
+    for (face, triangles, n) in [
+        ("f 1 2 3 3", vec![[0, 1, 2]], 1),
+        ("f 1 2 3 5", vec![[0, 1, 2]], 1),
+        ("f 1 2 3 1", vec![[1, 2, 0]], 1),
+        ("f 1 1 2 3 5 4", vec![[0, 1, 2], [0, 2, 3]], 1),
+        ("f 1 2 2 1", vec![[0, 1, 1], [0, 1, 0]], 0),
+    ] {
+        let surface = read(Format::Obj, format!("{vertices}f 1 2 6\n{face}\n")).unwrap();
+        let verts = |t: &[u32; 3]| t.map(|v| surface.points[v as usize]);
+        let found: Vec<_> = surface.triangles[1..].iter().map(verts).collect();
+        let place = |v: u32| [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]][v as usize];
+        let point = |v: u32| tetdb_base::geom::Point::from_array(place(v).map(f64::from));
+        let expected: Vec<_> = triangles.iter().map(|t| t.map(point)).collect();
+        assert_eq!(found, expected, "{face}");
+        let noted = |n: &tetdb_base::surface::Note| n.kind == NoteKind::RepeatedCorners { n: 1 };
+        assert_eq!(surface.notes.iter().filter(|n| noted(n)).count(), n, "{face}");
     }
 }
