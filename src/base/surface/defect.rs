@@ -29,6 +29,18 @@ pub enum SurfaceError {
         /// Vertices read so far.
         vertices: usize,
     },
+    /// The divided surface would exceed the memory allowed.
+    #[error(
+        "dividing the surface would give about {triangles} triangles, which take about {} MiB; it may take {} MiB", bytes >> 20, bytes_max >> 20
+    )]
+    SplitMemory {
+        /// Bytes allowed.
+        bytes_max: u64,
+        /// Bytes predicted.
+        bytes: u64,
+        /// Triangles predicted.
+        triangles: u64,
+    },
     /// Edges or points to embed do not fit the memory allowed.
     #[error(
         "edges and points of {vertices} vertices, or more, take more than the {bytes_max} bytes of memory allowed"
@@ -108,7 +120,9 @@ impl SurfaceError {
     pub fn code(&self) -> Code {
         match self {
             Self::TooLarge { .. } => Code::SurfaceTooLarge,
-            Self::Memory { .. } | Self::EmbedMemory { .. } => Code::Memory,
+            Self::Memory { .. } | Self::SplitMemory { .. } | Self::EmbedMemory { .. } => {
+                Code::Memory
+            }
             Self::NoSuchVertex { .. } => Code::IndexOutOfRange,
             Self::SharedFace { .. } => Code::UnsupportedContent,
             Self::Polygon { reason, .. } => super::polygon::code(reason),
@@ -123,6 +137,9 @@ impl SurfaceError {
         match self {
             Self::TooLarge { .. } => "split the surface into parts and mesh them one by one",
             Self::Memory { .. } => "allow more memory, or take a coarser surface",
+            Self::SplitMemory { .. } => {
+                "ask for longer edges, or allow more memory; triangles grow with the square of the inverse length"
+            }
             Self::EmbedMemory { .. } => "allow more memory, or take fewer edges and points",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
             Self::SharedFace { .. } => "remove cells that are there twice or overlap others",

@@ -57,7 +57,7 @@ pub use orientation::{Orientation, orient_alike, orient_alike_with};
 pub use repair::{Closing, Repair, closing, repair, repair_bytes};
 pub use seeds::{Seed, SeedKind};
 pub use seeker::{Crossing, Seeker};
-pub use split::{SplitReport, split};
+pub use split::{SplitReport, predict_split, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
 pub use validate::{Validation, validate, validate_with};
 pub use volumes::{EnclosedVolumes, OUTSIDE, VOLUMES_TRIANGLE, Wall};

@@ -38,6 +38,13 @@ pub struct SplitReport {
     pub deviation_max: f64,
 }
 
+/// Mean area of the divided triangles in squares of the wanted length: 0.42 on a cube, 0.26 to 0.35 on a slat.
+const AREA_MEAN: f64 = 0.4;
+/// A prediction below this share of the true number never refuses what would fit.
+const PREDICTION_LEAST: f64 = 0.7;
+/// A triangle is sampled in at most 4 to the power of this many parts: where lengths differ inside it.
+const SAMPLE_DEPTH: u32 = 5;
+
 /// An edge as its vertices, the smaller first.
 type EdgeKey = (u32, u32);
 
@@ -65,6 +72,14 @@ pub fn split(
         }),
     };
     fits(surface)?;
+    let n = predict_split(surface, h);
+    if PREDICTION_LEAST * n > TRIANGLES_MAX as f64 {
+        return Err(SurfaceError::TooLarge { what: "triangles", limit: TRIANGLES_MAX });
+    }
+    if PREDICTION_LEAST * n * BYTES_TRIANGLE as f64 > bytes_max as f64 {
+        let bytes = (n * BYTES_TRIANGLE as f64) as u64;
+        return Err(SurfaceError::SplitMemory { bytes_max, bytes, triangles: n as u64 });
+    }
     let mut plain = surface.clone();
     plain.drop_support_triangles();
     let parent = (0..plain.triangles.len() as u32).collect();
@@ -89,6 +104,29 @@ pub fn split(
     splitter.report.deviation_max = splitter.deviation(surface);
     splitter.surface.notes.clear();
     Ok((splitter.surface, splitter.report))
+}
+
+/// Predicts the number of triangles after [`split`], from areas over squares of wanted lengths. Support triangles are left out.
+pub fn predict_split(surface: &Surface, h: &dyn Fn(Point) -> f64) -> f64 {
+    let corners = |t: &[u32; 3]| t.map(|v| surface.points[v as usize]);
+    let triangles = (0u32..).zip(&surface.triangles);
+    let own = triangles.filter(|(t, _)| !surface.is_support_triangle(*t));
+    own.map(|(_, t)| predicted(corners(t), h, SAMPLE_DEPTH).max(1.0)).sum()
+}
+
+/// Predicted number of triangles in a part of a triangle.
+fn predicted([a, b, c]: [Point; 3], h: &dyn Fn(Point) -> f64, depth: u32) -> f64 {
+    let middle = (a + b + c) / 3.0;
+    let wanted = [a, b, c, middle].map(h);
+    let (low, high) =
+        wanted.iter().fold((f64::INFINITY, 0.0f64), |(l, u), &h| (l.min(h), u.max(h)));
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    if depth == 0 || longest <= low || high <= 1.1 * low && depth < SAMPLE_DEPTH - 1 {
+        return 0.5 * (b - a).cross(c - a).length() / (AREA_MEAN * wanted[3] * wanted[3]);
+    }
+    let [ab, bc, ca] = [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
+    let parts = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+    parts.into_iter().map(|part| predicted(part, h, depth - 1)).sum()
 }
 
 /// Swaps edges inside the triangles for which `is_divided` holds, if that raises the least angle. `parent`: the
@@ -392,5 +430,35 @@ mod tests {
         // Four long sides with 128 pieces of each long edge; in halves of halves there would be seventeen times as many.
         let n = fine.n_triangles();
         assert!((4 * 256..4 * 600).contains(&n), "{n}");
+    }
+
+    /// A cube and a slat, with lengths even, graded, and fine in one place.
+    #[test]
+    fn predictions_are_near_and_what_does_not_fit_is_refused_at_once() {
+        let mut slat = cube();
+        slat.points.iter_mut().for_each(|p| *p *= Point::new(1.0, 0.03, 0.2));
+        let place = Point::new(0.9, 0.0, 0.1);
+        let lengths: [(&str, &dyn Fn(Point) -> f64); 4] = [
+            ("even", &|_| 0.01),
+            ("coarse", &|_| 0.07),
+            ("graded", &|p| 0.005 + 0.1 * p.x),
+            ("place", &|p| 0.002 + 0.2 * p.distance(place)),
+        ];
+        for (name, surface) in [("cube", cube()), ("slat", slat)] {
+            for (of, h) in lengths {
+                let predicted = predict_split(&surface, h);
+                let (fine, _) = split(&surface, h, u64::MAX).unwrap();
+                let ratio = fine.n_triangles() as f64 / predicted;
+                assert!((0.75..1.6).contains(&ratio), "{name}, {of}: {ratio}");
+            }
+        }
+        let asked = std::cell::Cell::new(0u64);
+        let h = |_: Point| {
+            asked.set(asked.get() + 1);
+            1e-5
+        };
+        let error = split(&cube(), &h, 1 << 30).unwrap_err();
+        assert!(matches!(error, SurfaceError::SplitMemory { .. }), "{error}");
+        assert!(asked.get() < 1000, "asked {} times", asked.get());
     }
 }

@@ -534,7 +534,12 @@ pub fn divide(
     let wanted = wanted.map_or(f64::INFINITY, |length| length.resolve(diagonal));
     let sizes = predict_with(&surface.inner, options, field, cap, store)?.field;
     let scratch = scratch_beside(&surface.inner, cap, store)?;
-    surface.divide(&|p| sizes.h(p).min(wanted), cap, &scratch)?;
+    let h = |p| sizes.h(p).min(wanted);
+    let predicted = surface::predict_split(&surface.inner, &h);
+    if predicted > 2.0 * before as f64 {
+        settings.note(format!("dividing the surface into about {predicted:.0} triangles"));
+    }
+    surface.divide(&h, cap, &scratch)?;
     settings.note(format!(
         "the surface was divided into {} triangles, from {before}",
         surface.n_triangles()

@@ -17,7 +17,7 @@ use crate::watched::{Board, Listener, watched};
 #[pyo3(from_item_all)]
 pub struct JobWords<'py> {
     sizes: SizeWords<'py>,
-    regions: String,
+    regions: Option<String>,
     seeds: Vec<([f64; 3], Option<String>)>,
     holes: Vec<[f64; 3]>,
     refine_surface: bool,
@@ -52,13 +52,15 @@ impl SettingWords {
 
 fn mesher(py: Python<'_>, surface: &Surface, job: &JobWords<'_>) -> PyResult<Mesher> {
     let unknown = || Failure::internal("a word of an option is not known").raised(py);
-    let regions = match job.regions.as_str() {
-        "parity" => Regions::Parity,
-        "all" => Regions::All,
-        "outer" => Regions::Outer,
-        "by-orientation" => Regions::ByOrientation,
-        "seeds" => Regions::Seeds,
-        _ => return Err(unknown()),
+    let regions = match job.regions.as_deref() {
+        None => None,
+        Some("parity") => Some(Regions::Parity),
+        Some("all") => Some(Regions::All),
+        Some("outer") => Some(Regions::Outer),
+        Some("by-orientation") => Some(Regions::ByOrientation),
+        Some("seeds") => Some(Regions::Seeds),
+        Some("all-but-holes") => Some(Regions::AllButHoles),
+        Some(_) => return Err(unknown()),
     };
     let optimize = match job.optimize.as_str() {
         "none" => Optimize::None,
@@ -69,11 +71,13 @@ fn mesher(py: Python<'_>, surface: &Surface, job: &JobWords<'_>) -> PyResult<Mes
     let subdomains = job.subdomains.map_or(Subdomains::Auto, Subdomains::Exactly);
     let mut mesher = Mesher::new(tetdb::Surface::clone(&surface.inner))
         .sizes(job.sizes.sizes(py)?)
-        .regions(regions)
         .optimize(optimize)
         .subdomains(subdomains)
         .keep_coarse(job.keep_coarse)
         .refine_surface(job.refine_surface);
+    if let Some(regions) = regions {
+        mesher = mesher.regions(regions);
+    }
     for (point, name) in &job.seeds {
         mesher = mesher.region_seed(*point, name.as_deref());
     }

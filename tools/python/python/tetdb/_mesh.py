@@ -63,8 +63,9 @@ def mesh(
     size : Box, Sphere, Cylinder, InRegion, Field, Function, callable, str, path, or a list of them, optional
         Where edges are shorter. Of everything that applies the least length counts. A callable takes points (k, 3) and returns lengths
         (k,); it is asked once, on a regular grid (see :class:`Function`), and what it said is kept in the store.
-    regions : {"parity", "all", "outer", "by-orientation", "seeds"}
-        Which enclosed regions are filled. Default: ``"parity"``, or ``"seeds"`` where there are seeds or holes.
+    regions : {"parity", "all", "outer", "by-orientation", "seeds", "all-but-holes"}, optional
+        Which enclosed regions are filled. Default: ``"seeds"`` where there are seeds or holes, otherwise what the surface's files say
+        of regions and holes, otherwise ``"parity"``.
     seeds : dict or array, optional
         Points inside regions, by the names these get; or (k, 3) without names.
     holes : (k, 3) array, optional

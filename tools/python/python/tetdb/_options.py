@@ -140,7 +140,7 @@ def job(
     keep_coarse: bool = True,
 ) -> dict[str, Any]:
     """What shapes a mesh, in the words of the native half."""
-    rules = ("parity", "all", "outer", "by-orientation", "seeds")
+    rules = ("parity", "all", "outer", "by-orientation", "seeds", "all-but-holes")
     names: list[str | None]
     if isinstance(seeds, Mapping):
         names, inside = [str(name) for name in seeds], _points(list(seeds.values()), "seeds")
@@ -148,11 +148,11 @@ def job(
         inside = _points(seeds, "seeds")
         names = [None] * len(inside)
     empty = _points(holes, "holes")
-    if regions is None:
-        regions = "seeds" if inside or empty else "parity"
+    if regions is None and (inside or empty):
+        regions = "seeds"
     return {
         "sizes": _sizes.words(bounds, hsiz, hmin, hmax, hgrad, size),
-        "regions": one_of(regions, rules, "regions"),
+        "regions": None if regions is None else one_of(regions, rules, "regions"),
         "seeds": list(zip(inside, names)),
         "holes": empty,
         "refine_surface": bool(refine_surface),
