@@ -6,6 +6,8 @@ use tetdb_engine::api::{Code, MeshOptions, OptionsText, Seed, SeedKind, Word, ty
 use super::args::{ShapeArgs, SizeArgs};
 use super::failure::Failure;
 
+/// Keys of a recorded job that no file of options has.
+const OF_THE_PROGRAM: [&str; 2] = ["size_field_hash", "region_name"];
 /// Largest length of a file of options.
 const BYTES_MAX: u64 = 1 << 20;
 
@@ -108,7 +110,18 @@ fn text(path: &Path) -> std::io::Result<String> {
 }
 
 fn read(text: &str) -> Result<OptionsText, Failure> {
-    toml::from_str(text).map_err(|e| bad(e.to_string().trim_end().to_owned()))
+    let options: OptionsText = toml::from_str(text).map_err(|e| {
+        let mut message = e.to_string().trim_end().to_owned();
+        for key in OF_THE_PROGRAM {
+            message = message.replace(&format!("`{key}`, "), "");
+        }
+        bad(message)
+    })?;
+    let is_of_the_program = [options.size_field_hash.is_some(), !options.region_name.is_empty()];
+    match OF_THE_PROGRAM.iter().zip(is_of_the_program).find(|(_, is_there)| *is_there) {
+        Some((key, _)) => Err(bad(format!("{key} is written by the program alone"))),
+        None => Ok(options),
+    }
 }
 
 fn bad(what: String) -> Failure {
@@ -138,6 +151,16 @@ mod tests {
         {
             assert_eq!(read(text).err().map(|f| f.exit()), Some(2), "{text}");
         }
+    }
+
+    #[test]
+    fn keys_of_the_program_are_neither_taken_nor_listed() {
+        let message = |text: &str| read(text).err().map(|f| f.message).unwrap_or_default();
+        assert!(message("size_field_hash = \"12\"").contains("written by the program"));
+        assert!(message("region_name = [\"0,0,0,a\"]").contains("written by the program"));
+        let unknown = message("hsize = 1");
+        assert!(unknown.contains("size_field") && unknown.contains("`optimize`"), "{unknown}");
+        assert!(OF_THE_PROGRAM.iter().all(|key| !unknown.contains(key)), "{unknown}");
     }
 
     #[test]

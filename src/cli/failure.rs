@@ -27,6 +27,14 @@ impl Failure {
         self
     }
 
+    /// Adds to the help that `--force` overwrites `out`, if it is a file.
+    pub fn or_force(mut self, out: &std::path::Path) -> Self {
+        if let Some(help) = self.help.as_mut().filter(|_| out.is_file()) {
+            help.push_str(", or overwrite it with --force");
+        }
+        self
+    }
+
     /// The exit code.
     pub fn exit(&self) -> u8 {
         match self.code {
@@ -144,7 +152,7 @@ fn help_of(code: Code) -> &'static str {
         Code::BadSample => {
             "for example sample:balls,count=100 or sample:box,h=0.1; see `tetdb sample --help`"
         }
-        Code::SurfaceChanged => "put the old file back, or give the surface with --against",
+        Code::SurfaceChanged => "put the old file back, or mesh the new one with `tetdb mesh SURFACE -o STORE --force`; `tetdb verify` also takes the surface with --against",
         Code::SizeFieldChanged => "put the old files back, or mesh again with --force",
         Code::Usage => "write it to a file first: `tetdb sample balls,count=10 -o balls.stl`",
         Code::NoRoom => {

@@ -14,10 +14,14 @@ use tetdb_engine::api::{
     Excess, QualityRow, RegionInfo, Store, StoreInfo, StoreState, Tasks, short,
 };
 
+/// The recorded name of a surface that is kept in the store.
+const COPY: &str = "store:surface.obj";
 /// Largest number of regions listed one by one.
 const REGIONS_LISTED: usize = 12;
 /// Least number of tetrahedra for which bytes per tetrahedron are shown.
 const TETS_MEASURED: u64 = 10_000;
+/// Largest number of neighbors listed of each.
+const NEIGHBORS_LISTED: usize = 8;
 /// Largest number of sub-domains listed.
 const SUBDOMAINS_LISTED: usize = 32;
 
@@ -64,7 +68,11 @@ pub fn hex(digest: [u64; 2]) -> String {
 /// Prints the record for people.
 pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     let info = StoreInfo::read(path)?;
-    let surfaces: Vec<&str> = info.surfaces.iter().map(|s| s.path.as_str()).collect();
+    let surfaces = info.surfaces.iter().map(|s| match s.path.as_str() {
+        COPY => "a copy in the store of its surface",
+        path => path,
+    });
+    let surfaces: Vec<&str> = surfaces.collect();
     let state = state_words(info.state);
     console.line(&format!("{}: {state}, from {}", path.display(), surfaces.join(", ")));
     if console.is_verbose() {
@@ -152,12 +160,23 @@ fn print_subdomains(info: &StoreInfo, console: &Console) {
             part.id,
             part.tets,
             part.interface_faces,
-            count(part.neighbors.as_ref().map_or(0, Vec::len) as u64, "neighbor"),
+            neighbors(part.neighbors.as_deref().unwrap_or_default()),
             worst(part.worst_q)
         ));
     }
     if info.subdomains.len() > SUBDOMAINS_LISTED {
         console.line(&format!("  ... {} sub-domains in all", info.subdomains.len()));
+    }
+}
+
+/// The numbers of a sub-domain's neighbors; of many, only the first.
+fn neighbors(list: &[tetdb_engine::data::schema::catalog::NeighborRow]) -> String {
+    let shown: Vec<String> =
+        list.iter().take(NEIGHBORS_LISTED).map(|n| n.subdomain.to_string()).collect();
+    let rest = if list.len() > NEIGHBORS_LISTED { ", …" } else { "" };
+    match shown.is_empty() {
+        true => "no neighbor".to_owned(),
+        false => format!("{} {}{rest}", if list.len() == 1 { "neighbor" } else { "neighbors" }, shown.join(", ")),
     }
 }
 

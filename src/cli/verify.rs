@@ -36,6 +36,12 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     }
     found.accept(&args.store)?;
     console.line(&found.sentence());
+    if !store.summary().is_verified {
+        console.note(&format!(
+            "the record of the store is left as it is; `tetdb resume {}` verifies and puts that on record",
+            args.store.display()
+        ));
+    }
     Ok(0)
 }
 

@@ -600,5 +600,5 @@ pub(super) fn verify_new(
     }
     settings.note(verify::sentence(&report));
     verify::record(path, lock)?;
-    Ok(Verification { report })
+    Ok(Verification { report, is_refined: false })
 }
