@@ -37,36 +37,64 @@ pub fn options(args: &ShapeArgs) -> Result<MeshOptions, Failure> {
 
 /// The sizes given on the command line.
 pub fn sizes_of(args: &SizeArgs) -> OptionsText {
+    // Every flag is named: a new one does not compile until it has its line here.
+    let SizeArgs {
+        hsiz,
+        hmin,
+        hmax,
+        hgrad,
+        size_box,
+        size_sphere,
+        size_cylinder,
+        size_region,
+        size_field,
+        size_expr,
+    } = args.clone();
     OptionsText {
-        hsiz: args.hsiz.clone(),
-        hmin: args.hmin.clone(),
-        hmax: args.hmax.clone(),
-        hgrad: args.hgrad.clone(),
-        size_box: args.size_box.clone(),
-        size_sphere: args.size_sphere.clone(),
-        size_cylinder: args.size_cylinder.clone(),
-        size_region: args.size_region.clone(),
-        size_expr: args.size_expr.clone(),
-        size_field: args.size_field.clone(),
+        hsiz,
+        hmin,
+        hmax,
+        hgrad,
+        size_box,
+        size_sphere,
+        size_cylinder,
+        size_region,
+        size_expr,
+        size_field,
         ..OptionsText::default()
     }
 }
 
 /// All options given on the command line. Errors: the file of seeds, with its line.
 fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
+    // As in `sizes_of`.
+    let ShapeArgs {
+        sizes,
+        config: _,
+        refine_surface,
+        regions,
+        region_seed,
+        hole,
+        seeds: file_of_seeds,
+        optimize,
+        drop_coarse,
+        seal,
+        subdomains,
+        keep_stages,
+    } = args;
     let mut text = OptionsText {
-        regions: args.regions.map(|regions| regions.word().to_owned()),
-        region_seed: args.region_seed.clone(),
-        hole: args.hole.clone(),
-        optimize: args.optimize.map(|optimize| optimize.word().to_owned()),
-        subdomains: args.subdomains.clone(),
-        drop_coarse: args.drop_coarse,
-        seal: args.seal.map(|seal| seal.word().to_owned()),
-        keep_stages: args.keep_stages,
-        refine_surface: args.refine_surface,
-        ..sizes_of(&args.sizes)
+        regions: regions.map(|regions| regions.word().to_owned()),
+        region_seed: region_seed.clone(),
+        hole: hole.clone(),
+        optimize: optimize.map(|optimize| optimize.word().to_owned()),
+        subdomains: subdomains.clone(),
+        drop_coarse: *drop_coarse,
+        seal: seal.map(|seal| seal.word().to_owned()),
+        keep_stages: *keep_stages,
+        refine_surface: *refine_surface,
+        ..sizes_of(sizes)
     };
-    if let Some(path) = &args.seeds {
+    if let Some(path) = file_of_seeds {
         for seed in seeds(path)? {
             match seed.kind {
                 SeedKind::Hole => text.hole.push(seed.to_string()),

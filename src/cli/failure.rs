@@ -35,6 +35,23 @@ impl Failure {
         self
     }
 
+    /// Writes the names of the command's store and surface into the commands of the help.
+    pub fn filled(mut self, names: &[(&str, String)]) -> Self {
+        if let Some(help) = &mut self.help {
+            let parts = help.split('`').enumerate().map(|(k, part)| match k % 2 {
+                0 => part.to_owned(),
+                _ => {
+                    let words = part.split(' ').map(|word| {
+                        names.iter().find(|(key, _)| *key == word).map_or(word, |(_, name)| name)
+                    });
+                    words.collect::<Vec<_>>().join(" ")
+                }
+            });
+            *help = parts.collect::<Vec<_>>().join("`");
+        }
+        self
+    }
+
     /// The exit code.
     pub fn exit(&self) -> u8 {
         match self.code {
@@ -108,7 +125,7 @@ fn help_of(code: Code) -> &'static str {
             "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
         }
         Code::OpenSurface => {
-            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made; a sheet inside is none: give it with --embed FILE, or --allow-open"
+            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made. If the open part is meant as a sheet inside, give it with --embed, or use --allow-open"
         }
         Code::SelfIntersection => {
             "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"
@@ -159,8 +176,26 @@ fn help_of(code: Code) -> &'static str {
             "`tetdb estimate SURFACE` tells what a mesh takes; ask for longer edges (--hsiz), give more --memory, or put the store on another disk with -o"
         }
         Code::InvalidMesh => {
-            "`tetdb verify STORE --full --json` has examples; --embed names sheets"
+            "`tetdb verify STORE --full --json` lists the places; --embed names sheets"
         }
         _ => "check the path and its permissions",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn help_has_the_names_of_the_command() {
+        let names = [("STORE", "'my part.tetdb'".to_owned()), ("SURFACE", "a.stl b.stl".to_owned())];
+        for (help, filled) in [
+            ("`tetdb resume STORE` goes on", "`tetdb resume 'my part.tetdb'` goes on"),
+            ("`tetdb check SURFACE --repair`", "`tetdb check a.stl b.stl --repair`"),
+            ("a STORE, `tetdb info STORES`", "a STORE, `tetdb info STORES`"),
+        ] {
+            let failure = Failure::new(Code::Usage, "no").help(help).filled(&names);
+            assert_eq!(failure.help.as_deref(), Some(filled));
+        }
     }
 }

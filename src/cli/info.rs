@@ -9,7 +9,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::tasks;
-use super::words::{self, count};
+use super::words::{self, count, quality_range, worst};
 use tetdb_engine::api::{
     Excess, QualityRow, RegionInfo, Store, StoreInfo, StoreState, Tasks, short,
 };
@@ -46,7 +46,7 @@ pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
         console.line(&format!(
             "excess (q over the least that the surface allows): {} at most; above 2: {}",
             short(worst),
-            count(above_two, "tetrahedron").replace("tetrahedrons", "tetrahedra")
+            count(above_two, "tetrahedron")
         ));
     }
     Ok(0)
@@ -93,15 +93,15 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         return Ok(());
     }
     console.line(&format!(
-        "{} tetrahedra, {} vertices, {} in {}; {} on disk",
-        info.tets,
-        info.vertices,
+        "{}, {}, {} in {}; {} on disk",
+        count(info.tets, "tetrahedron"),
+        count(info.vertices, "vertex"),
         match info.input_triangles {
             Some(n) => count(n, "input triangle"),
             // Faces between sub-domains count in both of them.
             None => {
                 let n: u64 = info.subdomains.iter().map(|part| part.facets).sum();
-                format!("at most {n} input triangles")
+                format!("at most {}", count(n, "input triangle"))
             }
         },
         count(info.subdomains.len() as u64, "sub-domain"),
@@ -198,7 +198,7 @@ fn print_regions(regions: &[RegionInfo], labels: &[String], console: &Console) {
         let (number, what) = match row.filled {
             true => (
                 row.region.to_string(),
-                count(row.tets, "tetrahedron").replace("tetrahedrons", "tetrahedra"),
+                count(row.tets, "tetrahedron"),
             ),
             false => ("-".to_owned(), "empty".to_owned()),
         };
@@ -234,8 +234,8 @@ fn quality_lines(q: &QualityRow) -> Vec<String> {
     let total: u64 = q.bins.iter().sum();
     let mut lines = vec!["quality q (1 is regular, larger is worse):".to_owned()];
     for (i, &n) in q.bins.iter().enumerate().filter(|(_, n)| **n > 0) {
-        let to = if i + 1 == q.bins.len() { "inf".to_owned() } else { (i + 2).to_string() };
-        lines.push(format!("  [{:>2}, {to:>3}[ {:>9} %  {n:>12}", i + 1, share(n, total)));
+        let range = quality_range(i, q.bins.len());
+        lines.push(format!("  {range:<11} {:>9} %  {n:>12}", share(n, total)));
     }
     lines.push(format!(
         "  worst {}; dihedral angles {} to {} degrees",
@@ -256,17 +256,4 @@ fn share(n: u64, total: u64) -> String {
             .unwrap_or_else(|| "99.9999999".to_owned());
     }
     short(percent)
-}
-
-/// A quality in four digits, or in as many as keep it within its row of the table.
-fn worst(q: f64) -> String {
-    let text = short(q);
-    let is_in_its_row = text.parse::<f64>().is_ok_and(|shown| shown.floor() == q.floor());
-    match is_in_its_row || q >= 10.0 {
-        true => text,
-        false => (4..16)
-            .map(|digits| format!("{q:.digits$}"))
-            .find(|text| text.parse::<f64>().is_ok_and(|shown| shown.floor() == q.floor()))
-            .unwrap_or(text),
-    }
 }

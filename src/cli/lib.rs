@@ -117,8 +117,8 @@ fn run_alone() -> ExitCode {
     let done = done.map(|done| console.end_answer().and(done));
     let exit = match done {
         Ok(Ok(exit)) => exit,
-        Ok(Err(failure)) => console.fail(&failure),
-        Err(error) => console.fail(&error.into()),
+        Ok(Err(failure)) => console.fail(&failure.filled(&args.command.names())),
+        Err(error) => console.fail(&Failure::from(error).filled(&args.command.names())),
     };
     ExitCode::from(exit)
 }

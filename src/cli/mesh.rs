@@ -103,7 +103,8 @@ pub(super) fn begin(
     Ok(settings)
 }
 
-fn output(args: &MeshArgs) -> PathBuf {
+/// The store that is written.
+pub(super) fn output(args: &MeshArgs) -> PathBuf {
     args.output.clone().unwrap_or_else(|| {
         let first = args.surfaces.first().map_or("mesh", String::as_str);
         let stem = match first.strip_prefix(SAMPLE_PREFIX) {

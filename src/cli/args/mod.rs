@@ -13,6 +13,8 @@ mod words;
 
 use clap::{Parser, Subcommand};
 
+use super::words::quoted;
+
 pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
 pub use query::QueryArgs;
 pub use resaturate::ResaturateArgs;
@@ -23,12 +25,12 @@ pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
 pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs, SheetArgs};
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 
-/// Tetrahedral meshes of any size in a database, every input triangle kept.
+/// Fills a closed triangle surface with tetrahedra.
 #[derive(Debug, Parser)]
 #[command(name = "tetdb", version, about, max_term_width = 110)]
 #[command(
-    after_help = "`tetdb mesh` fills a closed triangle surface with tetrahedra and leaves a store, which is a directory; most other commands take a \
-    store and read it. A run that was stopped goes on with `tetdb resume`. Generated surfaces such as sample:balls,count=100 stand \
+    after_help = "`tetdb mesh` writes the mesh into a store, which is a directory; most other commands take a store and read it. \
+    `tetdb resume` continues a run that was stopped. Every input triangle is kept. Generated surfaces such as sample:balls,count=100 stand \
     wherever a surface file can.\n\n\
     Examples:\n  tetdb check part.stl\n  tetdb mesh part.stl --export part.vtu\n  tetdb info part.tetdb\n  tetdb report part.tetdb part.html\n  \
     tetdb mesh sample:balls,count=100 -o balls.tetdb --memory 256MiB\n\nExit codes: 0 done, 1 internal error, 2 usage, 3 bad input, 4 store damaged, 5 store busy, \
@@ -43,6 +45,13 @@ pub struct Args {
     pub verbose: bool,
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// The surfaces of a command as a shell reads them; `None` where they are not all of it, or are read from a pipe.
+fn plain(surfaces: &[String], sheets: &SheetArgs) -> Option<String> {
+    let is_all = sheets.files().next().is_none() && !surfaces.iter().any(|file| file == "-");
+    let quoted: Vec<String> = surfaces.iter().map(|file| quoted(file)).collect();
+    is_all.then(|| quoted.join(" "))
 }
 
 #[derive(Debug, Subcommand)]
@@ -121,6 +130,33 @@ pub enum Command {
 }
 
 impl Command {
+    /// The names that stand for STORE and SURFACE in help, as a shell reads them.
+    pub fn names(&self) -> Vec<(&'static str, String)> {
+        let (store, surfaces) = match self {
+            Self::Mesh(a) => (Some(crate::mesh::output(a)), plain(&a.surfaces, &a.sheets)),
+            Self::Estimate(a) => (None, plain(&a.surfaces, &a.sheets)),
+            Self::Check(a) => (None, plain(&a.surfaces, &a.sheets)),
+            Self::RefineSurface(a) => {
+                (None, plain(std::slice::from_ref(&a.surface), &SheetArgs::default()))
+            }
+            Self::Resume(a) => (Some(a.store.clone()), None),
+            Self::Plan(a) => (Some(a.store.clone()), None),
+            Self::Work(a) => (Some(a.store.clone()), None),
+            Self::Gather(a) => (Some(a.store.clone()), None),
+            Self::Resaturate(a) => (Some(a.store.clone()), None),
+            Self::Info(a) => (Some(a.of.store.clone()), None),
+            Self::Digest(a) => (Some(a.store.clone()), None),
+            Self::Query(a) => (Some(a.store.clone()), None),
+            Self::Verify(a) => (Some(a.store.clone()), None),
+            Self::Export(a) => (Some(a.store.clone()), None),
+            Self::Snapshot(a) => (Some(a.store.clone()), None),
+            Self::Report(a) => (Some(a.store.clone()), None),
+            Self::Compare(_) | Self::Sample(_) | Self::Completions(_) | Self::Man(_) => (None, None),
+        };
+        let store = store.map(|path| ("STORE", quoted(&path.to_string_lossy())));
+        store.into_iter().chain(surfaces.map(|names| ("SURFACE", names))).collect()
+    }
+
     /// Whether output is for programs.
     pub fn is_json(&self) -> bool {
         match self {

@@ -40,6 +40,7 @@ impl From<SurfaceError> for Error {
             SurfaceError::Invalid { defect, n_defects } => {
                 let more = match n_defects.saturating_sub(1) {
                     0 => String::new(),
+                    1 => " (and 1 more defect)".to_owned(),
                     n => format!(" (and {n} more defects)"),
                 };
                 error.at(defect.place() + &more)

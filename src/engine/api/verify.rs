@@ -102,8 +102,10 @@ pub(super) fn check(
 /// Summary of a valid report, in one line.
 pub(super) fn sentence(report: &Report) -> String {
     let mut text = format!(
-        "verified: {} tetrahedra, all positive by exact signs; {} inner faces paired",
-        report.tets, report.inner_faces
+        "verified: {} {}, all positive by exact signs; {} inner faces paired",
+        report.tets,
+        if report.tets == 1 { "tetrahedron" } else { "tetrahedra" },
+        report.inner_faces
     );
     if report.against_input {
         text += &format!(
