@@ -169,7 +169,9 @@ fn help_of(code: Code) -> &'static str {
         Code::BadSample => {
             "for example sample:balls,count=100 or sample:box,h=0.1; see `tetdb sample --help`"
         }
-        Code::SurfaceChanged => "put the old file back, or mesh the new one with `tetdb mesh SURFACE -o STORE --force`; `tetdb verify` also takes the surface with --against",
+        Code::SurfaceChanged => {
+            "put the old file back, or mesh the new one with `tetdb mesh SURFACE -o STORE --force`; `tetdb verify` also takes the surface with --against"
+        }
         Code::SizeFieldChanged => "put the old files back, or mesh again with --force",
         Code::Usage => "write it to a file first: `tetdb sample balls,count=10 -o balls.stl`",
         Code::NoRoom => {
@@ -188,7 +190,8 @@ mod tests {
 
     #[test]
     fn help_has_the_names_of_the_command() {
-        let names = [("STORE", "'my part.tetdb'".to_owned()), ("SURFACE", "a.stl b.stl".to_owned())];
+        let names =
+            [("STORE", "'my part.tetdb'".to_owned()), ("SURFACE", "a.stl b.stl".to_owned())];
         for (help, filled) in [
             ("`tetdb resume STORE` goes on", "`tetdb resume 'my part.tetdb'` goes on"),
             ("`tetdb check SURFACE --repair`", "`tetdb check a.stl b.stl --repair`"),

@@ -176,7 +176,11 @@ fn neighbors(list: &[tetdb_engine::data::schema::catalog::NeighborRow]) -> Strin
     let rest = if list.len() > NEIGHBORS_LISTED { ", …" } else { "" };
     match shown.is_empty() {
         true => "no neighbor".to_owned(),
-        false => format!("{} {}{rest}", if list.len() == 1 { "neighbor" } else { "neighbors" }, shown.join(", ")),
+        false => format!(
+            "{} {}{rest}",
+            if list.len() == 1 { "neighbor" } else { "neighbors" },
+            shown.join(", ")
+        ),
     }
 }
 
@@ -196,10 +200,7 @@ fn print_regions(regions: &[RegionInfo], labels: &[String], console: &Console) {
     }
     for RegionInfo { row, name, .. } in regions {
         let (number, what) = match row.filled {
-            true => (
-                row.region.to_string(),
-                count(row.tets, "tetrahedron"),
-            ),
+            true => (row.region.to_string(), count(row.tets, "tetrahedron")),
             false => ("-".to_owned(), "empty".to_owned()),
         };
         let around = row.labels.iter().filter_map(|&label| labels.get(label as usize));

@@ -88,8 +88,11 @@ mod tests {
     fn one_is_no_plural_and_long_lists_end() {
         assert_eq!(count(1u32, "region"), "1 region");
         assert_eq!(count(0u32, "region"), "0 regions");
-        assert_eq!(count(1u32, "tetrahedron") + " " + &count(2u32, "vertex"), "1 tetrahedron 2 vertices");
-        assert_eq!(quality_range(0, 10).trim() , "1 to 2");
+        assert_eq!(
+            count(1u32, "tetrahedron") + " " + &count(2u32, "vertex"),
+            "1 tetrahedron 2 vertices"
+        );
+        assert_eq!(quality_range(0, 10).trim(), "1 to 2");
         assert_eq!(quality_range(9, 10), "10 and more");
         let names: Vec<String> = (0..14).map(|n| n.to_string()).collect();
         assert!(listed(&names).ends_with("11 and 2 more"));

@@ -205,7 +205,8 @@ fn regions_and_edges_that_are_not_there_are_refused_and_chunks_count_once() {
         assert!(error["message"].to_string().contains(named), "{asked}: {error}");
     }
     place.write("p.txt", "0.1 0.2 0.3\n0.9 0.8 0.9\n0.5 0.5 0.5\n0.01 0.01 0.99\n");
-    for asked in ["--points p.txt", "--point 0.1,0.2,0.3 --point 0.11,0.2,0.3", "--ball surface:1"] {
+    for asked in ["--points p.txt", "--point 0.1,0.2,0.3 --point 0.11,0.2,0.3", "--ball surface:1"]
+    {
         let done = place.run_line(&format!("query a.tetdb {asked}")).succeeds();
         assert!(done.stderr().contains("read 1 of 1 "), "{}", done.stderr());
     }

@@ -13,8 +13,6 @@ mod words;
 
 use clap::{Parser, Subcommand};
 
-use super::words::quoted;
-
 pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
 pub use query::QueryArgs;
 pub use resaturate::ResaturateArgs;
@@ -45,13 +43,6 @@ pub struct Args {
     pub verbose: bool,
     #[command(subcommand)]
     pub command: Command,
-}
-
-/// The surfaces of a command as a shell reads them; `None` where they are not all of it, or are read from a pipe.
-fn plain(surfaces: &[String], sheets: &SheetArgs) -> Option<String> {
-    let is_all = sheets.files().next().is_none() && !surfaces.iter().any(|file| file == "-");
-    let quoted: Vec<String> = surfaces.iter().map(|file| quoted(file)).collect();
-    is_all.then(|| quoted.join(" "))
 }
 
 #[derive(Debug, Subcommand)]
@@ -130,33 +121,6 @@ pub enum Command {
 }
 
 impl Command {
-    /// The names that stand for STORE and SURFACE in help, as a shell reads them.
-    pub fn names(&self) -> Vec<(&'static str, String)> {
-        let (store, surfaces) = match self {
-            Self::Mesh(a) => (Some(crate::mesh::output(a)), plain(&a.surfaces, &a.sheets)),
-            Self::Estimate(a) => (None, plain(&a.surfaces, &a.sheets)),
-            Self::Check(a) => (None, plain(&a.surfaces, &a.sheets)),
-            Self::RefineSurface(a) => {
-                (None, plain(std::slice::from_ref(&a.surface), &SheetArgs::default()))
-            }
-            Self::Resume(a) => (Some(a.store.clone()), None),
-            Self::Plan(a) => (Some(a.store.clone()), None),
-            Self::Work(a) => (Some(a.store.clone()), None),
-            Self::Gather(a) => (Some(a.store.clone()), None),
-            Self::Resaturate(a) => (Some(a.store.clone()), None),
-            Self::Info(a) => (Some(a.of.store.clone()), None),
-            Self::Digest(a) => (Some(a.store.clone()), None),
-            Self::Query(a) => (Some(a.store.clone()), None),
-            Self::Verify(a) => (Some(a.store.clone()), None),
-            Self::Export(a) => (Some(a.store.clone()), None),
-            Self::Snapshot(a) => (Some(a.store.clone()), None),
-            Self::Report(a) => (Some(a.store.clone()), None),
-            Self::Compare(_) | Self::Sample(_) | Self::Completions(_) | Self::Man(_) => (None, None),
-        };
-        let store = store.map(|path| ("STORE", quoted(&path.to_string_lossy())));
-        store.into_iter().chain(surfaces.map(|names| ("SURFACE", names))).collect()
-    }
-
     /// Whether output is for programs.
     pub fn is_json(&self) -> bool {
         match self {

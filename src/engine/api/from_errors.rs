@@ -127,7 +127,9 @@ impl From<SizingError> for Error {
             SizingError::BadValue { option: "hgrad", .. } => {
                 "write a plain number, with a point and without a unit"
             }
-            SizingError::BadValue { option: "size_box" | "size_sphere" | "size_cylinder", .. } => {
+            SizingError::BadValue {
+                option: "size_box" | "size_sphere" | "size_cylinder", ..
+            } => {
                 "coordinates and radii are numbers in the surface's own unit; only lengths of edges can also be shares, such as 1%"
             }
             SizingError::BadRegion { .. } | SizingError::BadValue { option: "size_region", .. } => {

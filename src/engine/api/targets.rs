@@ -39,7 +39,10 @@ pub fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
                 true => String::new(),
                 false => format!(" is the same file as {}, which", input.display()),
             };
-            return refused(format!("{}{same} is an input, and would be overwritten", out.display()));
+            return refused(format!(
+                "{}{same} is an input, and would be overwritten",
+                out.display()
+            ));
         }
     }
     Ok(())
