@@ -106,7 +106,7 @@ fn help_of(code: Code) -> &'static str {
         }
         Code::Memory => "give more with --memory, or take a coarser surface",
         Code::Stopped if super::signals::has_store() => {
-            "`tetdb resume STORE` goes on from the last finished step"
+            "`tetdb resume STORE` continues from the last finished step"
         }
         Code::Stopped => "nothing was begun; run it again",
         Code::NoSuchPart => "`tetdb info STORE` lists what there is",
@@ -116,7 +116,7 @@ fn help_of(code: Code) -> &'static str {
         }
         Code::StoreExists => "choose another path, or replace it with --force",
         Code::NoCoarseLeaf => "mesh the surface again without --drop-coarse",
-        Code::StoreUnfinished => "`tetdb resume STORE` goes on with it",
+        Code::StoreUnfinished => "`tetdb resume STORE` continues it",
         Code::StoreFormat => "use the version of this program that wrote the store, or mesh again",
         Code::StoreRecipe => {
             "go on with the version of this program that began it, or mesh again with --force"

@@ -9,7 +9,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::tasks;
-use super::words::{self, count, quality_range, worst};
+use super::words::{self, count, quality_range, quoted, worst};
 use tetdb_engine::api::{
     Excess, QualityRow, RegionInfo, Store, StoreInfo, StoreState, Tasks, short,
 };
@@ -89,7 +89,8 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         return Ok(());
     }
     if !info.finished {
-        console.line(&format!("`tetdb resume {}` goes on with it", path.display()));
+        let store = quoted(&path.to_string_lossy());
+        console.line(&format!("`tetdb resume {store}` continues it"));
         return Ok(());
     }
     console.line(&format!(

@@ -8,6 +8,7 @@ use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::input;
+use super::words::quoted;
 use super::{config, export, info, memory, threads};
 use tetdb_engine::api::targets::{check_target, inputs_of};
 use tetdb_engine::api::{
@@ -66,8 +67,8 @@ fn begun(path: &Path, settings: &Settings, console: &Console) -> Result<u8, Fail
         answer["peak_bytes"] = json!(memory::peak());
         console.answer(&answer);
     } else if !console.is_quiet() {
-        let store = path.display();
-        console.line(&format!("{store}: the coarse mesh is there"));
+        console.line(&format!("{}: the coarse mesh is there", path.display()));
+        let store = quoted(&path.to_string_lossy());
         console.note(&format!(
             "next: `tetdb plan {store} --tasks N` makes tasks of the rest, `tetdb resume {store}` does it here"
         ));
@@ -141,7 +142,7 @@ fn finish(
             console.line(&format!("peak memory {} of {}", memory::show(peak), memory::show(cap)));
         }
         let page = path.with_extension("html");
-        let (store, page) = (path.display(), page.display());
+        let [store, page] = [path, &page].map(|path| quoted(&path.to_string_lossy()));
         console.note(&format!(
             "next: `tetdb report {store} {page}` shows it in a browser, `tetdb export {store} FILE.vtu` writes it for other programs"
         ));

@@ -10,6 +10,7 @@ use super::args::{GatherArgs, PlanArgs, WorkArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::task_scripts::Script;
+use super::words::quoted;
 use super::{memory, threads};
 use tetdb_engine::api::{ExportOptions, TaskStage, TaskStatus, Tasks, task_ranges};
 
@@ -106,7 +107,8 @@ pub fn gather(args: &GatherArgs, console: &Console) -> Result<u8, Failure> {
         console.answer(&answer);
     } else if gathered.finished {
         console.line(&format!("{} is finished", args.store.display()));
-        console.note(&format!("next: `tetdb resume {}` verifies it", args.store.display()));
+        let store = quoted(&args.store.to_string_lossy());
+        console.note(&format!("next: `tetdb resume {store}` verifies it"));
     } else {
         console.line(&format!(
             "stage {} of {}: tasks {} can begin",

@@ -250,3 +250,22 @@ fn the_help_of_samples_names_each_with_all_its_keys() {
         }
     }
 }
+
+#[test]
+fn help_can_be_copied_into_a_shell() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("my dir")).expect("a folder");
+    let open = TETRA.replace("4 4 0", "4 3 0").replace("3 0 3 2\n", "");
+    place.write("my dir/open.off", open);
+    place.write("it's.off", TETRA);
+    for (words, help) in [
+        (&["mesh", "my dir/open.off"][..], "`tetdb check 'my dir/open.off'`"),
+        (&["info", "my dir/none"], "-o 'my dir/none'`"),
+        (&["query", "it's.off"], "a surface is looked at by `tetdb check SURFACE`"),
+        (&["mesh", "it's.off", "--no-verify"], "`tetdb report 'it'\\''s.tetdb' 'it'\\''s.html'`"),
+        (&["verify", "it's.tetdb"], "`tetdb resume 'it'\\''s.tetdb'` verifies"),
+    ] {
+        let said = place.run(words).stderr();
+        assert!(said.contains(help), "{words:?}: {said}");
+    }
+}

@@ -193,7 +193,7 @@ fn a_fault_in_an_expression_is_pointed_at() {
 fn regions_and_edges_that_are_not_there_are_refused_and_chunks_count_once() {
     let place = small();
     for (asked, named) in [
-        ("--region 5", "no region 5; there are 1"),
+        ("--region 5", "no region 5; the regions are 1"),
         ("--region 1,0", "no region 0"),
         ("--shell surface:0,surface:1000000", "vertex"),
         ("--shell surface:0,surface:7", "no edge of the mesh joins surface:0 and surface:7"),

@@ -2,8 +2,7 @@
 
 use std::fmt;
 
-use tetdb_base::geom::{Point, short};
-use tetdb_base::surface::show;
+use tetdb_base::geom::short;
 
 /// Lowest, median and highest of some lengths, in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,10 +97,10 @@ impl SizeWarning {
                 short(*away)
             ),
             Self::FarBelowEdges { wanted, edges, at, .. } => format!(
-                "{} is far below the surface's edges, which are kept: they are about {} long at {}, and tetrahedra on them are badly shaped",
+                "{} is far below the surface's edges, which are kept: they are about {} long at ({}), and tetrahedra on them are badly shaped",
                 short(*wanted),
                 short(*edges),
-                show(Point::from_array(*at))
+                at.map(short).join(", ")
             ),
             Self::NeverReached { wanted, most, .. } => format!(
                 "{} is never reached: from the surface's edges lengths grow to {} at most (hgrad says how fast); is it in the surface's unit?",
