@@ -45,8 +45,9 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
     end(writer, console)?;
     report_count(n, (args.limit, is_cut), &mut store, console)?;
     if is_cut {
+        let limit = if args.points.is_some() { "" } else { ", --limit N the first N" };
         console.note(&format!(
-            "only the first {ROWS_SHOWN} rows are shown on a terminal; `| cat` or -o FILE gives all, --limit N the first N"
+            "only the first {ROWS_SHOWN} rows are shown on a terminal; `| cat` or -o FILE gives all{limit}"
         ));
     }
     Ok(0)
