@@ -50,9 +50,9 @@ codes! {
     BadMemory "bad-memory" 2 "a memory size has no unit or no meaning";
     BadSample "bad-sample" 2 "there is no such sample, or a key of it is wrong";
     UnreadableFile "unreadable-file" 3 "an input file is missing or may not be read";
-    UnknownFormat "unknown-format" 3 "the format of a file does not follow from its name";
+    UnknownFormat "unknown-format" 3 "the name of a file does not say its format";
     TruncatedFile "truncated-file" 3 "an input file ends too early";
-    UnexpectedText "unexpected-text" 3 "an input file has something else than its format asks for";
+    UnexpectedText "unexpected-text" 3 "an input file has text that its format does not allow";
     NotANumber "not-a-number" 3 "a coordinate is not a finite number";
     IndexOutOfRange "index-out-of-range" 3 "a triangle names a vertex that is not there";
     CountMismatch "count-mismatch" 3 "a declared count cannot be right";
@@ -77,7 +77,7 @@ codes! {
     WireContact "wire-contact" 3 "an embedded edge or point meets a triangle or an edge elsewhere than in common vertices";
     WireTooNear "wire-too-near" 3 "an embedded edge or point is nearer to something else than can be meshed";
     NoSuchStore "no-such-store" 3 "there is no store at this path";
-    NoSuchPart "no-such-part" 3 "the store has no such tetrahedron, vertex, label, sub-domain, interface or stage";
+    NoSuchPart "no-such-part" 3 "the store has no such tetrahedron, vertex, edge, label, region, sub-domain, interface or stage";
     Damaged "damaged" 4 "the store is not what was written";
     StoreRecipe "store-recipe" 8 "the store was begun by a version whose recipe gives another mesh";
     Busy "busy" 5 "another process writes the store";
@@ -89,7 +89,7 @@ codes! {
     InvalidMesh "invalid-mesh" 7 "verification found the mesh invalid";
     StoreExists "store-exists" 8 "a finished store is already there";
     StoreUnfinished "store-unfinished" 8 "the store is not finished";
-    NoTasks "no-tasks" 8 "nobody has planned tasks for the store, or the stage of a task has not come";
+    NoTasks "no-tasks" 8 "the store has no plan of tasks, or the task's stage has not begun";
     TasksLeft "tasks-left" 8 "some tasks of a stage have no usable receipt and have to be done again";
     TaskFile "task-file" 4 "a file that tasks exchange is missing or damaged";
     NoCoarseLeaf "no-coarse-leaf" 8 "the coarse snapshot of the sub-domain was not kept";
@@ -98,7 +98,7 @@ codes! {
     StoreFormat "store-format" 8 "the store has another format version";
     SurfaceChanged "surface-changed" 8 "the surface is not the one the store was begun with";
     SizeFieldChanged "size-field-changed" 8 "the sizes of the size field are not those the store was begun with";
-    Stopped "stopped" 130 "stopped by a signal; `tetdb resume` goes on";
+    Stopped "stopped" 130 "stopped by a signal; `tetdb resume` continues";
 }
 
 impl fmt::Display for Code {

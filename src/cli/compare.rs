@@ -6,6 +6,7 @@ use super::args::CompareArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
+use super::words::{quality_range, worst};
 use tetdb_engine::api::{Comparison, Population, Qualities};
 
 /// Exit code if the meshes differ.
@@ -62,21 +63,32 @@ fn population(name: &str, a: &Population, b: &Population, console: &Console) {
         change(a.tets, b.tets)
     ));
     for bin in (0..a.bins.len()).filter(|&k| a.bins[k] + b.bins[k] > 0) {
-        let to = match bin + 2 {
-            11 => "inf".to_owned(),
-            to => to.to_string(),
+        let points = match a.tets == 0 || b.tets == 0 {
+            true => String::new(),
+            false => format!("{:>+8.4} points", 100.0 * (b.share(bin) - a.share(bin))),
         };
         console.line(&format!(
-            "  [{:>2}, {to:>3}[   {:>14} {:>8.4}% {:>14} {:>8.4}% {:>+8.4}",
-            bin + 1,
+            "  {:<12} {:>14} {} {:>14} {} {points}",
+            quality_range(bin, a.bins.len()),
             a.bins[bin],
-            100.0 * a.share(bin),
+            share(a, bin),
             b.bins[bin],
-            100.0 * b.share(bin),
-            100.0 * (b.share(bin) - a.share(bin))
+            share(b, bin)
         ));
     }
-    console.line(&format!("  {:<12} {:>14.3} {:>9} {:>14.3}", "worst", a.worst, "", b.worst));
+    let worst = [a, b].map(|group| match group.tets {
+        0 => "-".to_owned(),
+        _ => worst(group.worst),
+    });
+    console.line(&format!("  {:<12} {:>14} {:>9} {:>14}", "worst", worst[0], "", worst[1]));
+}
+
+/// The share of a bin in percent; empty without tetrahedra.
+fn share(group: &Population, bin: usize) -> String {
+    match group.tets {
+        0 => format!("{:>9}", ""),
+        _ => format!("{:>8.4}%", 100.0 * group.share(bin)),
+    }
 }
 
 /// The change from `a` to `b` in percent.

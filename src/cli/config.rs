@@ -7,6 +7,8 @@ use tetdb_engine::api::{Code, MeshOptions, OptionsText, Seed, SeedKind, Word, re
 use super::args::{ShapeArgs, SizeArgs};
 use super::failure::Failure;
 
+/// Keys of a recorded job that no file of options has.
+const OF_THE_PROGRAM: [&str; 2] = ["size_field_hash", "region_name"];
 /// Largest length of a file of options.
 const BYTES_MAX: u64 = 1 << 20;
 
@@ -36,36 +38,64 @@ pub fn options(args: &ShapeArgs) -> Result<MeshOptions, Failure> {
 
 /// The sizes given on the command line.
 pub fn sizes_of(args: &SizeArgs) -> OptionsText {
+    // Every flag is named: a new one does not compile until it has its line here.
+    let SizeArgs {
+        hsiz,
+        hmin,
+        hmax,
+        hgrad,
+        size_box,
+        size_sphere,
+        size_cylinder,
+        size_region,
+        size_field,
+        size_expr,
+    } = args.clone();
     OptionsText {
-        hsiz: args.hsiz.clone(),
-        hmin: args.hmin.clone(),
-        hmax: args.hmax.clone(),
-        hgrad: args.hgrad.clone(),
-        size_box: args.size_box.clone(),
-        size_sphere: args.size_sphere.clone(),
-        size_cylinder: args.size_cylinder.clone(),
-        size_region: args.size_region.clone(),
-        size_expr: args.size_expr.clone(),
-        size_field: args.size_field.clone(),
+        hsiz,
+        hmin,
+        hmax,
+        hgrad,
+        size_box,
+        size_sphere,
+        size_cylinder,
+        size_region,
+        size_expr,
+        size_field,
         ..OptionsText::default()
     }
 }
 
 /// All options given on the command line. Errors: the file of seeds, with its line.
 fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
+    // As in `sizes_of`.
+    let ShapeArgs {
+        sizes,
+        config: _,
+        refine_surface,
+        regions,
+        region_seed,
+        hole,
+        seeds: file_of_seeds,
+        optimize,
+        drop_coarse,
+        seal,
+        subdomains,
+        keep_stages,
+    } = args;
     let mut text = OptionsText {
-        regions: args.regions.map(|regions| regions.word().to_owned()),
-        region_seed: args.region_seed.clone(),
-        hole: args.hole.clone(),
-        optimize: args.optimize.map(|optimize| optimize.word().to_owned()),
-        subdomains: args.subdomains.clone(),
-        drop_coarse: args.drop_coarse,
-        seal: args.seal.map(|seal| seal.word().to_owned()),
-        keep_stages: args.keep_stages,
-        refine_surface: args.refine_surface,
-        ..sizes_of(&args.sizes)
+        regions: regions.map(|regions| regions.word().to_owned()),
+        region_seed: region_seed.clone(),
+        hole: hole.clone(),
+        optimize: optimize.map(|optimize| optimize.word().to_owned()),
+        subdomains: subdomains.clone(),
+        drop_coarse: *drop_coarse,
+        seal: seal.map(|seal| seal.word().to_owned()),
+        keep_stages: *keep_stages,
+        refine_surface: *refine_surface,
+        ..sizes_of(sizes)
     };
-    if let Some(path) = &args.seeds {
+    if let Some(path) = file_of_seeds {
         for seed in seeds(path)? {
             match seed.kind {
                 SeedKind::Hole => text.hole.push(seed.to_string()),
@@ -96,7 +126,18 @@ fn text(path: &Path) -> std::io::Result<String> {
 }
 
 fn read(text: &str) -> Result<OptionsText, Failure> {
-    toml::from_str(text).map_err(|e| bad(e.to_string().trim_end().to_owned()))
+    let options: OptionsText = toml::from_str(text).map_err(|e| {
+        let mut message = e.to_string().trim_end().to_owned();
+        for key in OF_THE_PROGRAM {
+            message = message.replace(&format!("`{key}`, "), "");
+        }
+        bad(message)
+    })?;
+    let is_of_the_program = [options.size_field_hash.is_some(), !options.region_name.is_empty()];
+    match OF_THE_PROGRAM.iter().zip(is_of_the_program).find(|(_, is_there)| *is_there) {
+        Some((key, _)) => Err(bad(format!("{key} is written by the program alone"))),
+        None => Ok(options),
+    }
 }
 
 fn bad(what: String) -> Failure {
@@ -126,6 +167,16 @@ mod tests {
         {
             assert_eq!(read(text).err().map(|f| f.exit()), Some(2), "{text}");
         }
+    }
+
+    #[test]
+    fn keys_of_the_program_are_neither_taken_nor_listed() {
+        let message = |text: &str| read(text).err().map(|f| f.message).unwrap_or_default();
+        assert!(message("size_field_hash = \"12\"").contains("written by the program"));
+        assert!(message("region_name = [\"0,0,0,a\"]").contains("written by the program"));
+        let unknown = message("hsize = 1");
+        assert!(unknown.contains("size_field") && unknown.contains("`optimize`"), "{unknown}");
+        assert!(OF_THE_PROGRAM.iter().all(|key| !unknown.contains(key)), "{unknown}");
     }
 
     #[test]

@@ -89,7 +89,9 @@ fn write_share(
     }
     if !args.force {
         let inputs = inputs_of(&args.store);
-        args.out.iter().try_for_each(|out| check_target(out, &inputs))?;
+        for out in &args.out {
+            check_target(out, &inputs).map_err(|e| Failure::from(e).or_force(out))?;
+        }
     }
     let store = Store::open_with(&args.store, settings)?;
     let mut reports = Vec::new();

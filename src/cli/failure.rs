@@ -27,6 +27,31 @@ impl Failure {
         self
     }
 
+    /// Adds to the help that `--force` overwrites `out`, if it is a file.
+    pub fn or_force(mut self, out: &std::path::Path) -> Self {
+        if let Some(help) = self.help.as_mut().filter(|_| out.is_file()) {
+            help.push_str(", or overwrite it with --force");
+        }
+        self
+    }
+
+    /// Writes the names of the command's store and surface into the commands of the help.
+    pub fn filled(mut self, names: &[(&str, String)]) -> Self {
+        if let Some(help) = &mut self.help {
+            let parts = help.split('`').enumerate().map(|(k, part)| match k % 2 {
+                0 => part.to_owned(),
+                _ => {
+                    let words = part.split(' ').map(|word| {
+                        names.iter().find(|(key, _)| *key == word).map_or(word, |(_, name)| name)
+                    });
+                    words.collect::<Vec<_>>().join(" ")
+                }
+            });
+            *help = parts.collect::<Vec<_>>().join("`");
+        }
+        self
+    }
+
     /// The exit code.
     pub fn exit(&self) -> u8 {
         match self.code {
@@ -81,7 +106,7 @@ fn help_of(code: Code) -> &'static str {
         }
         Code::Memory => "give more with --memory, or take a coarser surface",
         Code::Stopped if super::signals::has_store() => {
-            "`tetdb resume STORE` goes on from the last finished step"
+            "`tetdb resume STORE` continues from the last finished step"
         }
         Code::Stopped => "nothing was begun; run it again",
         Code::NoSuchPart => "`tetdb info STORE` lists what there is",
@@ -91,7 +116,7 @@ fn help_of(code: Code) -> &'static str {
         }
         Code::StoreExists => "choose another path, or replace it with --force",
         Code::NoCoarseLeaf => "mesh the surface again without --drop-coarse",
-        Code::StoreUnfinished => "`tetdb resume STORE` goes on with it",
+        Code::StoreUnfinished => "`tetdb resume STORE` continues it",
         Code::StoreFormat => "use the version of this program that wrote the store, or mesh again",
         Code::StoreRecipe => {
             "go on with the version of this program that began it, or mesh again with --force"
@@ -100,7 +125,7 @@ fn help_of(code: Code) -> &'static str {
             "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
         }
         Code::OpenSurface => {
-            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made; a sheet inside is none: give it with --embed FILE, or --allow-open"
+            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made. If the open part is meant as a sheet inside, give it with --embed, or use --allow-open"
         }
         Code::SelfIntersection => {
             "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"
@@ -144,15 +169,36 @@ fn help_of(code: Code) -> &'static str {
         Code::BadSample => {
             "for example sample:balls,count=100 or sample:box,h=0.1; see `tetdb sample --help`"
         }
-        Code::SurfaceChanged => "put the old file back, or give the surface with --against",
+        Code::SurfaceChanged => {
+            "put the old file back, or mesh the new one with `tetdb mesh SURFACE -o STORE --force`; `tetdb verify` also takes the surface with --against"
+        }
         Code::SizeFieldChanged => "put the old files back, or mesh again with --force",
         Code::Usage => "write it to a file first: `tetdb sample balls,count=10 -o balls.stl`",
         Code::NoRoom => {
             "`tetdb estimate SURFACE` tells what a mesh takes; ask for longer edges (--hsiz), give more --memory, or put the store on another disk with -o"
         }
         Code::InvalidMesh => {
-            "`tetdb verify STORE --full --json` has examples; --embed names sheets"
+            "`tetdb verify STORE --full --json` lists the places; --embed names sheets"
         }
         _ => "check the path and its permissions",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn help_has_the_names_of_the_command() {
+        let names =
+            [("STORE", "'my part.tetdb'".to_owned()), ("SURFACE", "a.stl b.stl".to_owned())];
+        for (help, filled) in [
+            ("`tetdb resume STORE` goes on", "`tetdb resume 'my part.tetdb'` goes on"),
+            ("`tetdb check SURFACE --repair`", "`tetdb check a.stl b.stl --repair`"),
+            ("a STORE, `tetdb info STORES`", "a STORE, `tetdb info STORES`"),
+        ] {
+            let failure = Failure::new(Code::Usage, "no").help(help).filled(&names);
+            assert_eq!(failure.help.as_deref(), Some(filled));
+        }
     }
 }

@@ -9,15 +9,19 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::tasks;
-use super::words::{self, count};
+use super::words::{self, count, quality_range, quoted, worst};
 use tetdb_engine::api::{
     Excess, QualityRow, RegionInfo, Store, StoreInfo, StoreState, Tasks, short,
 };
 
+/// The recorded name of a surface that is kept in the store.
+const COPY: &str = "store:surface.obj";
 /// Largest number of regions listed one by one.
 const REGIONS_LISTED: usize = 12;
 /// Least number of tetrahedra for which bytes per tetrahedron are shown.
 const TETS_MEASURED: u64 = 10_000;
+/// Largest number of neighbors listed of each.
+const NEIGHBORS_LISTED: usize = 8;
 /// Largest number of sub-domains listed.
 const SUBDOMAINS_LISTED: usize = 32;
 
@@ -42,7 +46,7 @@ pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
         console.line(&format!(
             "excess (q over the least that the surface allows): {} at most; above 2: {}",
             short(worst),
-            count(above_two, "tetrahedron").replace("tetrahedrons", "tetrahedra")
+            count(above_two, "tetrahedron")
         ));
     }
     Ok(0)
@@ -64,7 +68,11 @@ pub fn hex(digest: [u64; 2]) -> String {
 /// Prints the record for people.
 pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     let info = StoreInfo::read(path)?;
-    let surfaces: Vec<&str> = info.surfaces.iter().map(|s| s.path.as_str()).collect();
+    let surfaces = info.surfaces.iter().map(|s| match s.path.as_str() {
+        COPY => "a copy in the store of its surface",
+        path => path,
+    });
+    let surfaces: Vec<&str> = surfaces.collect();
     let state = state_words(info.state);
     console.line(&format!("{}: {state}, from {}", path.display(), surfaces.join(", ")));
     if console.is_verbose() {
@@ -81,19 +89,19 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         return Ok(());
     }
     if !info.finished {
-        console.line(&format!("`tetdb resume {}` goes on with it", words::quoted(path)));
+        console.line(&format!("`tetdb resume {}` continues it", quoted(path)));
         return Ok(());
     }
     console.line(&format!(
-        "{} tetrahedra, {} vertices, {} in {}; {} on disk",
-        info.tets,
-        info.vertices,
+        "{}, {}, {} in {}; {} on disk",
+        count(info.tets, "tetrahedron"),
+        count(info.vertices, "vertex"),
         match info.input_triangles {
             Some(n) => count(n, "input triangle"),
             // Faces between sub-domains count in both of them.
             None => {
                 let n: u64 = info.subdomains.iter().map(|part| part.facets).sum();
-                format!("at most {n} input triangles")
+                format!("at most {}", count(n, "input triangle"))
             }
         },
         count(info.subdomains.len() as u64, "sub-domain"),
@@ -152,12 +160,27 @@ fn print_subdomains(info: &StoreInfo, console: &Console) {
             part.id,
             part.tets,
             part.interface_faces,
-            count(part.neighbors.as_ref().map_or(0, Vec::len) as u64, "neighbor"),
+            neighbors(part.neighbors.as_deref().unwrap_or_default()),
             worst(part.worst_q)
         ));
     }
     if info.subdomains.len() > SUBDOMAINS_LISTED {
         console.line(&format!("  ... {} sub-domains in all", info.subdomains.len()));
+    }
+}
+
+/// The numbers of a sub-domain's neighbors; of many, only the first.
+fn neighbors(list: &[tetdb_engine::data::schema::catalog::NeighborRow]) -> String {
+    let shown: Vec<String> =
+        list.iter().take(NEIGHBORS_LISTED).map(|n| n.subdomain.to_string()).collect();
+    let rest = if list.len() > NEIGHBORS_LISTED { ", …" } else { "" };
+    match shown.is_empty() {
+        true => "no neighbor".to_owned(),
+        false => format!(
+            "{} {}{rest}",
+            if list.len() == 1 { "neighbor" } else { "neighbors" },
+            shown.join(", ")
+        ),
     }
 }
 
@@ -177,10 +200,7 @@ fn print_regions(regions: &[RegionInfo], labels: &[String], console: &Console) {
     }
     for RegionInfo { row, name, .. } in regions {
         let (number, what) = match row.filled {
-            true => (
-                row.region.to_string(),
-                count(row.tets, "tetrahedron").replace("tetrahedrons", "tetrahedra"),
-            ),
+            true => (row.region.to_string(), count(row.tets, "tetrahedron")),
             false => ("-".to_owned(), "empty".to_owned()),
         };
         let around = row.labels.iter().filter_map(|&label| labels.get(label as usize));
@@ -215,8 +235,8 @@ fn quality_lines(q: &QualityRow) -> Vec<String> {
     let total: u64 = q.bins.iter().sum();
     let mut lines = vec!["quality q (1 is regular, larger is worse):".to_owned()];
     for (i, &n) in q.bins.iter().enumerate().filter(|(_, n)| **n > 0) {
-        let to = if i + 1 == q.bins.len() { "inf".to_owned() } else { (i + 2).to_string() };
-        lines.push(format!("  [{:>2}, {to:>3}[ {:>9} %  {n:>12}", i + 1, share(n, total)));
+        let range = quality_range(i, q.bins.len());
+        lines.push(format!("  {range:<11} {:>9} %  {n:>12}", share(n, total)));
     }
     lines.push(format!(
         "  worst {}; dihedral angles {} to {} degrees",
@@ -237,17 +257,4 @@ fn share(n: u64, total: u64) -> String {
             .unwrap_or_else(|| "99.9999999".to_owned());
     }
     short(percent)
-}
-
-/// A quality in four digits, or in as many as keep it within its row of the table.
-fn worst(q: f64) -> String {
-    let text = short(q);
-    let is_in_its_row = text.parse::<f64>().is_ok_and(|shown| shown.floor() == q.floor());
-    match is_in_its_row || q >= 10.0 {
-        true => text,
-        false => (4..16)
-            .map(|digits| format!("{q:.digits$}"))
-            .find(|text| text.parse::<f64>().is_ok_and(|shown| shown.floor() == q.floor()))
-            .unwrap_or(text),
-    }
 }

@@ -17,6 +17,7 @@ mod info;
 mod input;
 mod memory;
 mod mesh;
+mod names;
 mod query;
 mod query_ask;
 mod query_rows;
@@ -117,8 +118,8 @@ fn run_alone() -> ExitCode {
     let done = done.map(|done| console.end_answer().and(done));
     let exit = match done {
         Ok(Ok(exit)) => exit,
-        Ok(Err(failure)) => console.fail(&failure),
-        Err(error) => console.fail(&error.into()),
+        Ok(Err(failure)) => console.fail(&failure.filled(&names::names(&args.command))),
+        Err(error) => console.fail(&Failure::from(error).filled(&names::names(&args.command))),
     };
     ExitCode::from(exit)
 }

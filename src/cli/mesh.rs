@@ -104,7 +104,8 @@ pub(super) fn begin(
     Ok(settings)
 }
 
-fn output(args: &MeshArgs) -> PathBuf {
+/// The store that is written.
+pub(super) fn output(args: &MeshArgs) -> PathBuf {
     args.output.clone().unwrap_or_else(|| {
         let first = args.surfaces.first().map_or("mesh", String::as_str);
         let first = first.strip_prefix(BOUNDARY_PREFIX).unwrap_or(first);

@@ -1,11 +1,14 @@
 //! The command `query`: tetrahedra by position, number, neighborhood or condition.
 
+use std::io::{IsTerminal, stdout};
+
 use super::args::QueryArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::query_ask::{bad, point, query};
 use super::query_rows::{Sink, Writer};
+use super::words::count;
 use tetdb_engine::api::error::Error;
 use tetdb_engine::api::{
     AnswerColumn, AnswerFile, AnswerRow, Order, PointColumns, PointTable, Settings, Store,
@@ -14,6 +17,8 @@ use tetdb_engine::api::{
 
 /// Memory for one point while it is answered, in bytes.
 const POINT_BYTES: u64 = 512;
+/// Rows shown on a terminal of an answer that has no condition and no limit; some 100,000 a second scroll by otherwise.
+const ROWS_SHOWN: u64 = 20;
 /// Position of excess among the variables.
 const EXCESS: usize = VARIABLES.len() - 1;
 /// Largest number of points answered together.
@@ -28,16 +33,20 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
     let columns = columns(args)?;
     let order = order(args)?;
     let mut store = Store::open_with(&args.store, settings.clone())?;
+    let mut writer = writer(args, columns.clone(), &settings, console)?;
     let n = match args.point.is_empty() && args.points.is_none() {
-        true => select(args, &mut store, (columns, order), &settings, console)?,
-        false => {
-            let mut writer = writer(args, columns, &settings, console)?;
-            let n = locate(args, &mut store, settings.cap()? / 8, &mut writer, console)?;
-            end(writer, console)?;
-            n
-        }
+        true => select(args, &mut store, (columns, order), &mut writer)?,
+        false => locate(args, &mut store, settings.cap()? / 8, &mut writer, console)?,
     };
-    report_count(n, args.limit, &mut store, console)?;
+    let is_cut = writer.is_cut();
+    end(writer, console)?;
+    report_count(n, (args.limit, is_cut), &mut store, console)?;
+    if is_cut {
+        let limit = if args.points.is_some() { "" } else { ", --limit N the first N" };
+        console.note(&format!(
+            "only the first {ROWS_SHOWN} rows are shown on a terminal; `| cat` or -o FILE gives all{limit}"
+        ));
+    }
     Ok(0)
 }
 
@@ -46,8 +55,7 @@ fn select(
     args: &QueryArgs,
     store: &mut Store,
     (columns, order): (Vec<AnswerColumn>, Option<(&str, Order)>),
-    settings: &Settings,
-    console: &Console,
+    writer: &mut Writer,
 ) -> Result<u64, Failure> {
     let mut query = query(args, store)?;
     if columns.contains(&AnswerColumn::Variable(EXCESS)) {
@@ -56,18 +64,17 @@ fn select(
     if let Some((variable, order)) = order {
         query = query.order_by(variable, order)?;
     }
-    if let Some(limit) = args.limit {
+    // One more than is shown tells whether there are more.
+    if let Some(limit) = args.limit.or(writer.rows_max().map(|n| n + 1)) {
         query = query.limit(usize::try_from(limit).unwrap_or(usize::MAX));
     }
-    let mut writer = writer(args, columns, settings, console)?;
     let mut n = 0;
     for hit in query.answers()? {
-        n += 1;
         if !writer.put(&hit?.into())? {
             break;
         }
+        n += 1;
     }
-    end(writer, console)?;
     Ok(n)
 }
 
@@ -86,7 +93,10 @@ fn writer(
         None if args.csv => Sink::Values,
         None => Sink::Table,
     };
-    Ok(Writer::new(sink, columns, console))
+    let is_long = args.points.is_some() || args.point.is_empty() && !args.has_condition();
+    let is_cut = is_long && args.limit.is_none() && stdout().is_terminal();
+    let rows_max = (is_cut && matches!(sink, Sink::Table)).then_some(ROWS_SHOWN);
+    Ok(Writer::new(sink, columns, rows_max, console))
 }
 
 fn end(writer: Writer, console: &Console) -> Result<(), Failure> {
@@ -99,7 +109,7 @@ fn end(writer: Writer, console: &Console) -> Result<(), Failure> {
 
 fn report_count(
     n: u64,
-    limit: Option<u64>,
+    (limit, is_cut): (Option<u64>, bool),
     store: &mut Store,
     console: &Console,
 ) -> Result<(), Failure> {
@@ -107,13 +117,14 @@ fn report_count(
     console.measures(&serde_json::json!({ "found": n, "chunks": chunks }));
     if !console.is_json() {
         let found = match limit == Some(n) {
+            _ if is_cut => format!("{n} shown"),
             true => format!("{n} shown, as many as were asked for"),
             false => format!("{n} found"),
         };
         console.note(&format!(
-            "{found}; read {} of {} chunks of tetrahedra, {} of {} of vertices",
+            "{found}; read {} of {} of tetrahedra, {} of {} of vertices",
             chunks.tet_chunks_read,
-            chunks.tet_chunks,
+            count(chunks.tet_chunks, "chunk"),
             chunks.vertex_chunks_read,
             chunks.vertex_chunks
         ));
@@ -178,11 +189,11 @@ fn locate(
     }
     let mut answer = |points: &mut Vec<[f64; 3]>, writer: &mut Writer| -> Result<bool, Failure> {
         for (point, found) in points.iter().zip(store.locate_barycentric(points)?) {
-            n += u64::from(found.is_some());
-            let row = AnswerRow::from_point(*point, found);
-            if !writer.put(&row)? {
+            let is_found = found.is_some();
+            if !writer.put(&AnswerRow::from_point(*point, found))? {
                 return Ok(false);
             }
+            n += u64::from(is_found);
         }
         points.clear();
         Ok(true)

@@ -64,12 +64,30 @@ pub struct Writer {
     /// Lines not yet written to the standard output.
     lines: String,
     closed: bool,
+    rows: u64,
+    /// Number of rows after which nothing is written.
+    rows_max: Option<u64>,
+    is_cut: bool,
 }
 
 impl Writer {
-    pub fn new(sink: Sink, columns: Vec<AnswerColumn>, console: &Console) -> Self {
-        let mut writer =
-            Self { sink, columns, console: console.clone(), lines: String::new(), closed: false };
+    /// A writer of at most `rows_max` rows.
+    pub fn new(
+        sink: Sink,
+        columns: Vec<AnswerColumn>,
+        rows_max: Option<u64>,
+        console: &Console,
+    ) -> Self {
+        let mut writer = Self {
+            sink,
+            columns,
+            console: console.clone(),
+            lines: String::new(),
+            closed: false,
+            rows: 0,
+            rows_max,
+            is_cut: false,
+        };
         match writer.sink {
             Sink::Table => writer.print(&line(&writer.columns, None)),
             Sink::Values => writer.print(&csv_head(&writer.columns)),
@@ -91,8 +109,22 @@ impl Writer {
         self.lines.clear();
     }
 
-    /// Writes a row. Returns `false` once writing to the standard output has failed.
+    pub fn rows_max(&self) -> Option<u64> {
+        self.rows_max
+    }
+
+    /// Returns whether a row was not written because there were enough.
+    pub fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
+    /// Writes a row. Returns `false` once there are enough, or writing to the standard output has failed.
     pub fn put(&mut self, row: &AnswerRow) -> Result<bool, Failure> {
+        if self.rows_max.is_some_and(|most| self.rows >= most) {
+            self.is_cut = true;
+            return Ok(false);
+        }
+        self.rows += 1;
         let text = match &mut self.sink {
             Sink::Table => line(&self.columns, Some(row)),
             Sink::Values => row.csv(&self.columns),

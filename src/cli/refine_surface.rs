@@ -22,7 +22,8 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
         unreachable!("it was given");
     };
     if !args.force {
-        check_target(&args.output, &[PathBuf::from(&args.surface)])?;
+        check_target(&args.output, &[PathBuf::from(&args.surface)])
+            .map_err(|e| Failure::from(e).or_force(&args.output))?;
     }
     let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
     let settings = input::scratch_beside(settings, &args.output);

@@ -10,7 +10,8 @@ use super::args::{GatherArgs, PlanArgs, WorkArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::task_scripts::Script;
-use super::{memory, threads, words};
+use super::words::quoted;
+use super::{memory, threads};
 use tetdb_engine::api::{ExportOptions, TaskStage, TaskStatus, Tasks, task_ranges};
 
 /// Number of sub-domains per task in the last stage, so that tasks end at about the same time.
@@ -105,8 +106,9 @@ pub fn gather(args: &GatherArgs, console: &Console) -> Result<u8, Failure> {
         answer["schema"] = json!(1);
         console.answer(&answer);
     } else if gathered.finished {
-        console.line(&format!("{} is finished", words::quoted(&args.store)));
-        console.note(&format!("next: `tetdb resume {}` verifies it", args.store.display()));
+        console.line(&format!("{} is finished", args.store.display()));
+        let store = quoted(&args.store);
+        console.note(&format!("next: `tetdb resume {store}` verifies it"));
     } else {
         console.line(&format!(
             "stage {} of {}: tasks {} can begin",

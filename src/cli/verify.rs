@@ -6,6 +6,7 @@ use super::args::VerifyArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::input;
+use super::words::quoted;
 use super::{memory, threads};
 use tetdb_engine::api::{Code, Settings, Store, VerifyLevel};
 
@@ -36,6 +37,12 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     }
     found.accept(&args.store)?;
     console.line(&found.sentence());
+    if !store.summary().is_verified {
+        console.note(&format!(
+            "the record of the store is left as it is; `tetdb resume {}` verifies and records it",
+            quoted(&args.store)
+        ));
+    }
     Ok(0)
 }
 

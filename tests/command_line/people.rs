@@ -228,3 +228,44 @@ fn errors_have_colors_on_a_terminal_that_may_have_them() {
     let piped = place.run_line("check none.off").stderr();
     assert!(!piped.contains("\u{1b}["), "{piped:?}");
 }
+
+#[test]
+fn the_help_of_samples_names_each_with_all_its_keys() {
+    let place = Place::new();
+    let help = place.run_line("sample --help").succeeds().stdout();
+    let names = tetdb_kernel::samples::SAMPLES;
+    let words = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains(&names.join(", ")), "{help}");
+    for name in names {
+        let line = help.lines().find(|line| line.trim_start().starts_with(&format!("{name} ")));
+        let line = line.unwrap_or_else(|| panic!("no line for {name} in {help}"));
+        let asked = format!("check sample:{name},nothing=1 --json");
+        let error = place.run_line(&asked).error()["message"].to_string();
+        let keys = error.rsplit_once("keys are").map_or("", |(_, keys)| keys);
+        let keys: Vec<&str> =
+            keys.split(|c: char| !c.is_alphanumeric()).filter(|k| !k.is_empty()).collect();
+        assert!(!keys.is_empty(), "{error}");
+        for key in keys {
+            assert!(line.split([' ', ',']).any(|word| word == key), "{name} has {key}: {line}");
+        }
+    }
+}
+
+#[test]
+fn help_can_be_copied_into_a_shell() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("my dir")).expect("a folder");
+    let open = TETRA.replace("4 4 0", "4 3 0").replace("3 0 3 2\n", "");
+    place.write("my dir/open.off", open);
+    place.write("it's.off", TETRA);
+    for (words, help) in [
+        (&["mesh", "my dir/open.off"][..], "`tetdb check 'my dir/open.off'`"),
+        (&["info", "my dir/none"], "-o 'my dir/none'`"),
+        (&["query", "it's.off"], "a surface is looked at by `tetdb check SURFACE`"),
+        (&["mesh", "it's.off", "--no-verify"], "`tetdb report 'it'\\''s.tetdb' 'it'\\''s.html'`"),
+        (&["verify", "it's.tetdb"], "`tetdb resume 'it'\\''s.tetdb'` verifies"),
+    ] {
+        let said = place.run(words).stderr();
+        assert!(said.contains(help), "{words:?}: {said}");
+    }
+}

@@ -188,3 +188,26 @@ fn a_fault_in_an_expression_is_pointed_at() {
     assert_eq!(lines[1].find("qality"), lines[2].find('^'), "{text}");
     assert_eq!(done.exit(), Some(2));
 }
+
+#[test]
+fn regions_and_edges_that_are_not_there_are_refused_and_chunks_count_once() {
+    let place = small();
+    for (asked, named) in [
+        ("--region 5", "no region 5; the regions are 1"),
+        ("--region 1,0", "no region 0"),
+        ("--shell surface:0,surface:1000000", "vertex"),
+        ("--shell surface:0,surface:7", "no edge of the mesh joins surface:0 and surface:7"),
+    ] {
+        let done = place.run_line(&format!("query a.tetdb {asked} --json"));
+        assert_eq!(done.exit(), Some(3), "{asked}");
+        let error = done.error();
+        assert_eq!(error["code"], "no-such-part", "{asked}");
+        assert!(error["message"].to_string().contains(named), "{asked}: {error}");
+    }
+    place.write("p.txt", "0.1 0.2 0.3\n0.9 0.8 0.9\n0.5 0.5 0.5\n0.01 0.01 0.99\n");
+    for asked in ["--points p.txt", "--point 0.1,0.2,0.3 --point 0.11,0.2,0.3", "--ball surface:1"]
+    {
+        let done = place.run_line(&format!("query a.tetdb {asked}")).succeeds();
+        assert!(done.stderr().contains("read 1 of 1 "), "{}", done.stderr());
+    }
+}

@@ -45,3 +45,29 @@ fn a_divided_surface_without_room_is_refused_before_a_store_exists() {
     assert_eq!(refused.error()["code"], "memory");
     assert!(!place.path("a.tetdb").exists());
 }
+
+#[test]
+fn a_refined_surface_is_named_where_another_is_compared_with() {
+    let place = Place::new();
+    place.run_line("sample box,h=1 -o box.off").succeeds();
+    place.run_line("mesh box.off --hsiz 0.25 --refine-surface -o a.tetdb").succeeds();
+    let told = place.run_line("info a.tetdb").succeeds().stdout();
+    assert!(told.contains("from a copy in the store of its surface"), "{told}");
+    let found = place.run_line("verify a.tetdb --against box.off");
+    assert_eq!(found.exit(), Some(7));
+    assert!(found.stderr().contains("was refined before"), "{}", found.stderr());
+    place.run_line("verify a.tetdb").succeeds();
+    place.run_line("verify a.tetdb --against a.tetdb/surface.obj").succeeds();
+}
+
+#[test]
+fn a_file_that_is_read_is_not_overwritten_without_force() {
+    let place = Place::new();
+    place.run_line("sample box,h=1 -o box.off").succeeds();
+    let refused = place.run_line("refine-surface box.off box.off --hsiz 0.5");
+    assert_eq!(refused.exit(), Some(2));
+    for part in ["box.off is an input, and would be overwritten", "--force"] {
+        assert!(refused.stderr().contains(part), "{}", refused.stderr());
+    }
+    place.run_line("refine-surface box.off box.off --hsiz 0.5 --force").succeeds();
+}

@@ -185,3 +185,23 @@ fn expressions_that_are_no_sizes_are_named() {
         assert!(place.names().is_empty());
     }
 }
+
+#[test]
+fn a_shape_names_its_bad_number_and_help_fits_the_fault() {
+    let place = Place::new();
+    for (asked, parts) in [
+        ("--size-sphere 1.5,0,0,5%,2%", ["in it 5%", "coordinates and radii"]),
+        ("--size-box 0,0,0,1,1,x,0.1", ["in it x", "coordinates and radii"]),
+        ("--size-cylinder 0,0,0,1,1,1,1,-2", ["in it -2", "lengths above zero"]),
+        ("--size-sphere 1,2,3", ["X,Y,Z,R,H", "coordinates and radii"]),
+        ("--size-region 5,0.1", ["5", "name a region"]),
+        ("--size-expr x", ["size-expr x is", "everywhere in the surface's box"]),
+        ("--hsiz 5mm", ["5mm", "share of its box diagonal"]),
+    ] {
+        let done = place.run_line(&format!("estimate sample:box,h=0.5 {asked}"));
+        assert_eq!(done.exit(), Some(2), "{asked}");
+        for part in parts {
+            assert!(done.stderr().contains(part), "{asked}: {}", done.stderr());
+        }
+    }
+}

@@ -18,8 +18,15 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
         let selection = Selection { subdomains: Some(vec![1]), ..none() };
         let n = expect(&mut session, &all, selection, |t| t.id.subdomain().rank() == 1)?;
         assert!(n > 0);
-        let selection = Selection { regions: Some(vec![2, 7]), ..none() };
-        expect(&mut session, &all, selection, |t| t.region == 2)?;
+        let last = all.iter().map(|t| t.region).max().unwrap_or_default();
+        let selection = Selection { regions: Some(vec![last]), ..none() };
+        expect(&mut session, &all, selection, |t| t.region == last)?;
+        // Only the mesh of a surface has its regions on record.
+        if !session.store.regions()?.is_empty() {
+            let selection = Selection { regions: Some(vec![last, 7]), ..none() };
+            let refused = session.select(selection).err();
+            assert!(matches!(refused, Some(QueryError::NoRegion { .. })), "{refused:?}");
+        }
         for text in [
             "quality > 1.5 and region = 1",
             "x < 0.25 or z > 0.75 and subdomain in [1]",

@@ -1,3 +1,5 @@
+//! Errors between memory and disk.
+
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 

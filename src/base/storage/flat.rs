@@ -1,3 +1,5 @@
+//! Pages without a cap or a disk, for measurements.
+
 use tetdb_schema::page::{SLOTS, Slot, u32_le};
 
 use super::{Pages, kind};

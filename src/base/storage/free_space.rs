@@ -1,3 +1,5 @@
+//! Free space of a disk.
+
 use std::path::Path;
 
 /// Bytes free on the disk of `dir`, if the system reports them.

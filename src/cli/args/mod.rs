@@ -23,12 +23,12 @@ pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
 pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs, SheetArgs};
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 
-/// Tetrahedral meshes of any size in a database, every input triangle kept.
+/// Fills a closed triangle surface with tetrahedra.
 #[derive(Debug, Parser)]
 #[command(name = "tetdb", version, about, max_term_width = 110)]
 #[command(
-    after_help = "`tetdb mesh` fills a closed triangle surface with tetrahedra and leaves a store, which is a directory; most other commands take a \
-    store and read it. A run that was stopped goes on with `tetdb resume`. Generated surfaces such as sample:balls,count=100 stand \
+    after_help = "`tetdb mesh` writes the mesh into a store, which is a directory; most other commands take a store and read it. \
+    `tetdb resume` continues a run that was stopped. Every input triangle is kept. Generated surfaces such as sample:balls,count=100 stand \
     wherever a surface file can.\n\n\
     Examples:\n  tetdb check part.stl\n  tetdb mesh part.stl --export part.vtu\n  tetdb info part.tetdb\n  tetdb report part.tetdb part.html\n  \
     tetdb mesh sample:balls,count=100 -o balls.tetdb --memory 256MiB\n\nExit codes: 0 done, 1 internal error, 2 usage, 3 bad input, 4 store damaged, 5 store busy, \

@@ -93,6 +93,19 @@ pub struct QueryArgs {
     pub json: bool,
 }
 
+impl QueryArgs {
+    /// Whether anything says which tetrahedra are meant.
+    pub fn has_condition(&self) -> bool {
+        let lists = [&self.boxes, &self.sphere, &self.plane];
+        let places = [&self.subdomain, &self.region, &self.label, &self.interface, &self.condition];
+        let ids = [&self.tet, &self.neighbors, &self.ball, &self.shell];
+        lists.iter().any(|list| !list.is_empty())
+            || places.into_iter().chain(ids).any(Option::is_some)
+            || self.touching_surface
+            || self.touching_sheet
+    }
+}
+
 /// What makes no sense together with points.
 const PLACES: [&str; 17] = [
     "boxes",

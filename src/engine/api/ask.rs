@@ -107,7 +107,7 @@ impl<'s> Query<'s> {
         self
     }
 
-    /// Selects tetrahedra in one of these regions.
+    /// Selects tetrahedra in one of these regions. The answers are an error, `no-such-part`, if one of them is not filled.
     pub fn in_regions(mut self, regions: &[u32]) -> Self {
         self.selection.regions = Some(regions.to_vec());
         self

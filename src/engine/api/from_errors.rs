@@ -40,6 +40,7 @@ impl From<SurfaceError> for Error {
             SurfaceError::Invalid { defect, n_defects, files } => {
                 let more = match n_defects.saturating_sub(1) {
                     0 => String::new(),
+                    1 => " (and 1 more defect)".to_owned(),
                     n => format!(" (and {n} more defects)"),
                 };
                 error.at(defect.place(files) + &more)
@@ -123,8 +124,22 @@ impl From<QueryError> for Error {
 impl From<SizingError> for Error {
     fn from(e: SizingError) -> Self {
         let help = match &e {
-            SizingError::BadValue { expected, .. } if !expected.contains("length") => {
+            SizingError::BadValue { option: "hgrad", .. } => {
                 "write a plain number, with a point and without a unit"
+            }
+            SizingError::BadValue {
+                option: "size_box" | "size_sphere" | "size_cylinder", ..
+            } => {
+                "coordinates and radii are numbers in the surface's own unit; only lengths of edges can also be shares, such as 1%"
+            }
+            SizingError::BadRegion { .. } | SizingError::BadValue { option: "size_region", .. } => {
+                "name a region by its number or name, or by a label of triangles around it, then a comma and a length such as 0.5 or 1%"
+            }
+            SizingError::BadFormula { .. } | SizingError::NoSize { .. } => {
+                "an expression in x, y and z that is a length everywhere in the surface's box, such as 0.05+0.1*abs(z)"
+            }
+            SizingError::SizeCount { .. } => {
+                "write one size for each vertex of the surface, or give a mesh of tetrahedra with sizes at its vertices"
             }
             _ => {
                 "a length is a number in the surface's own unit, such as 0.5, or a share of its box diagonal, such as 1%"

@@ -506,7 +506,7 @@ impl Mesher {
 pub(super) fn report(summary: &pipeline::Summary, settings: &Settings) {
     if let Some(requested) = summary.subdomains_requested {
         settings.note(format!(
-            "note: {requested} sub-domains were asked for, the mesh has {}: one of fewer than 25,000 tetrahedra would be all refined zone",
+            "note: {requested} sub-domains were asked for, the mesh has {}: a smaller one, of fewer than 25,000 tetrahedra, would lie wholly in the bands beside interfaces that are refined before the cut",
             summary.subdomains
         ));
     }
@@ -608,5 +608,5 @@ pub(super) fn verify_new(
     }
     settings.note(verify::sentence(&report));
     verify::record(path, lock)?;
-    Ok(Verification { report })
+    Ok(Verification { report, is_refined: false })
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
 
 use super::guard::guarded_in;
-use super::{Error, Event, Settings, Surface, Verification, VerifyLevel, verify};
+use super::{Error, Event, Settings, Surface, Verification, VerifyLevel, job, verify};
 use tetdb_base::storage::RunContext;
 use tetdb_schema::catalog::{InterfaceRow, RegionRow, StoreState, SubdomainRow};
 use tetdb_store::audit::Level;
@@ -166,7 +166,11 @@ impl Store {
         surface: &Surface,
         level: VerifyLevel,
     ) -> Result<Verification, Error> {
-        guarded_in(&self.context, || self.verify_with(Some(surface), level))
+        guarded_in(&self.context, || {
+            let found = self.verify_with(Some(surface), level)?;
+            let options = job::options_of(&self.catalog.share().job()?, &self.path)?;
+            Ok(Verification { is_refined: options.refine_surface, ..found })
+        })
     }
 
     fn verify_with(
@@ -182,7 +186,7 @@ impl Store {
         let surface = surface.map(|surface| &surface.inner);
         let mut catalog = self.catalog.share();
         let report = verify::check(&mut catalog, &self.settings, surface, cap, level)?;
-        Ok(Verification { report })
+        Ok(Verification { report, is_refined: false })
     }
 
     /// Returns whether another store has the same mesh, bit for bit, in the same sub-domains.

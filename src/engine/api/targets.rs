@@ -37,10 +37,13 @@ pub fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
     let read = files.flat_map(|input| with_others(&input, &READ));
     for input in read {
         if let Some(out) = written.iter().find(|out| is_same_file(&input, out)) {
+            let same = match *out == input {
+                true => String::new(),
+                false => format!(" is the same file as {}, which", input.display()),
+            };
             return refused(format!(
-                "{} would be overwritten: it is {}, which this run reads or the store was meshed from",
-                out.display(),
-                input.display()
+                "{}{same} is an input, and would be overwritten",
+                out.display()
             ));
         }
     }

@@ -12,7 +12,7 @@ use tetdb_base::geom::{Point, short};
 use tetdb_base::storage::attempt;
 use tetdb_base::surface::{Surface, show};
 use tetdb_schema::catalog::StoreState;
-use tetdb_store::audit::{self, Level, Report};
+use tetdb_store::audit::{self, Finding, Level, Report};
 use tetdb_store::store::{Catalog, StoreError, WriterLock};
 
 /// Extent of a verification. Each level includes the levels before it.
@@ -32,6 +32,9 @@ pub enum VerifyLevel {
 #[serde(transparent)]
 pub struct Verification {
     pub(super) report: Report,
+    /// True if the mesh was compared with a given surface, while its own was refined before it was meshed.
+    #[serde(skip)]
+    pub(super) is_refined: bool,
 }
 
 impl Verification {
@@ -55,7 +58,16 @@ impl Verification {
     /// # Errors
     /// `invalid-mesh`, with the first offending tetrahedron.
     pub fn accept(&self, store: &Path) -> Result<(), Error> {
-        if self.report.valid { Ok(()) } else { Err(invalid(&self.report, store)) }
+        if self.report.valid {
+            return Ok(());
+        }
+        let error = invalid(&self.report, store);
+        match self.is_refined && self.report.count(Finding::NotAnInputTriangle) > 0 {
+            true => Err(error.with_help(
+                "the store's surface was refined before it was meshed: it is the copy in the store, surface.obj, not the surface that was given",
+            ).with_remedy(Remedy::AsSaid)),
+            false => Err(error),
+        }
     }
 
     /// Kinds of defects in words, with the number of each.
@@ -90,8 +102,10 @@ pub(super) fn check(
 /// Summary of a valid report, in one line.
 pub(super) fn sentence(report: &Report) -> String {
     let mut text = format!(
-        "verified: {} tetrahedra, all positive by exact signs; {} inner faces paired",
-        report.tets, report.inner_faces
+        "verified: {} {}, all positive by exact signs; {} inner faces paired",
+        report.tets,
+        if report.tets == 1 { "tetrahedron" } else { "tetrahedra" },
+        report.inner_faces
     );
     if report.against_input {
         text += &format!(

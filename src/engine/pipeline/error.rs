@@ -1,3 +1,5 @@
+//! Errors of a run: those of its steps, and its own.
+
 use thiserror::Error;
 
 use tetdb_base::geom::Point;

@@ -33,8 +33,8 @@ fn read_blob_with<T>(
     })
 }
 
-/// Number of sub-domains; 1 until the number is decided.
-pub fn n_subdomains(catalog: &mut Catalog) -> Result<u32, StoreError> {
+/// The number of sub-domains on record; 1 until it is decided.
+pub fn recorded_n_subdomains(catalog: &mut Catalog) -> Result<u32, StoreError> {
     let bytes = catalog.blob(Blob::SubdomainCount)?;
     Ok(bytes.as_deref().and_then(u32::from_bytes).unwrap_or(1))
 }

@@ -149,7 +149,7 @@ pub fn statistics(
         let surface = session.surface_of(rank)?;
         for chunk in 0..chunks {
             check_cancelled();
-            session.count_tets();
+            session.count_tets(rank, chunk);
             let part = &mut session.part(rank)?.subdomain;
             let chunk = checked_chunk(part, chunk)?;
             let (first, records) = (chunk.first, chunk.records);

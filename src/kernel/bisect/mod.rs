@@ -4,7 +4,7 @@
 //! 2. `zone`: edges that meet a band around it are divided until the band has its final density.
 //! 3. `core`: its middle is copied out and optimized as a mesh of its own.
 //! 4. `interface`: faces of these final tetrahedra are chosen, by a minimum cut and moves; from then on they are required.
-//! 5. `split`: each side becomes a mesh of its own.
+//! 5. `write_child`: each side becomes a mesh of its own.
 //!
 //! Tetrahedra at the interface (Z) that later vertices could destroy are frozen, so that valid ones stay valid. Hits on
 //! them are counted; if there are none, the interface has cost the Delaunay property nothing.

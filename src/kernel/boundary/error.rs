@@ -1,3 +1,5 @@
+//! Errors of boundary recovery, with the places a user can look at.
+
 use std::fmt;
 
 use thiserror::Error;

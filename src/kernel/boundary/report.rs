@@ -1,3 +1,5 @@
+//! Counts and times of boundary recovery.
+
 use std::time::Duration;
 
 /// Gets how much is done and how much there is to do.

@@ -1,4 +1,4 @@
-//! Where vertices had better be: grains of an arrangement that is relaxed already.
+//! Positions for new vertices: grains of a periodic arrangement of points that is already relaxed.
 //!
 //! Points that divide edges stand anywhere; smoothing takes many sweeps to spread them evenly. So each moves to the nearest place of
 //! a pattern before it is tried: points at distances of one wanted length that repeat in all directions, with no tetrahedron of

@@ -1,6 +1,6 @@
-//! What saturation did.
+//! Counts of what saturation tried and did.
 
-/// What saturation did.
+/// Counts of one saturation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RefineReport {
     /// Passes over the mesh.

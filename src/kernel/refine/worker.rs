@@ -1,4 +1,4 @@
-//! Who divides edges: the kernel and the scratch of one block.
+//! The worker of one block, which divides edges: the insertion kernel and its scratch data.
 
 use super::activity::Activity;
 use super::candidate::Candidates;

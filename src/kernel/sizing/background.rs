@@ -159,6 +159,10 @@ impl SizeConstraint for BackgroundMesh {
         Ok(self.at(p).unwrap_or(f64::INFINITY))
     }
 
+    fn option(&self) -> Option<&'static str> {
+        Some("size_field")
+    }
+
     /// Linear pieces have their extremes at vertices. So the vertices in the cell are examined besides its corners and
     /// middle.
     fn divides(&self, middle: Point, width: f64) -> Option<bool> {

@@ -132,7 +132,7 @@ impl SizeField {
         let h = sizes.values(&scaled, &constraints)?;
         let field = Self::from_corners(frame, targets.beta, tree, corners, h, scratch)
             .with_sources(options, bounds.diagonal())?;
-        let summary = field.summary(&seeds, &targets, options, scratch);
+        let summary = field.summary(&seeds, &targets, options, &list, scratch);
         Ok((field, summary))
     }
 

@@ -49,4 +49,8 @@ impl SizeConstraint for Formula {
         }
         Err(SizingError::NoSize { text: self.text.clone(), at: p.to_array(), found: h })
     }
+
+    fn option(&self) -> Option<&'static str> {
+        Some("size_expr")
+    }
 }

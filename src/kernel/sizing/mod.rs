@@ -1,4 +1,4 @@
-//! Wanted edge length h(x), its load, the predicted mesh.
+//! The size field: the wanted edge length h(x), the load that follows from it, and the predicted mesh.
 //!
 //! The field is a pure function of position: it does not depend on the order of insertion, the decomposition or the
 //! number of threads. It is built once from the surface. An octree (`tree`) is fine only where sizes differ. Values on

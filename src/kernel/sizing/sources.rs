@@ -169,9 +169,19 @@ impl SourceText<'_> {
         let mut numbers = [0.0; N];
         for (number, word) in numbers.iter_mut().zip(&words) {
             let read: Option<f64> = word.trim().parse().ok();
-            *number = read.filter(|x| x.is_finite()).ok_or_else(|| self.bad())?;
+            *number = read.filter(|x| x.is_finite()).ok_or_else(|| SizingError::BadValue {
+                option: self.option,
+                found: format!("{} (in it {})", self.text, word.trim()),
+                expected: "a plain number for each coordinate and for a radius; only H and OUTSIDE may be shares such as 2%",
+            })?;
         }
-        let length = |i: usize| Length::parse(self.option, words[i]);
+        let length = |i: usize| {
+            Length::parse(self.option, words[i]).map_err(|_| SizingError::BadValue {
+                option: self.option,
+                found: format!("{} (in it {})", self.text, words[i].trim()),
+                expected: "H and OUTSIDE to be lengths above zero, such as 0.25, or shares of the box diagonal, such as 1%",
+            })
+        };
         let outside = (words.len() == N + 2).then(|| length(N + 1)).transpose()?;
         Ok((numbers, length(N)?, outside))
     }
@@ -189,6 +199,15 @@ impl ResolvedSource {
     /// The smallest size of the source.
     pub fn least(&self) -> f64 {
         self.inside.min(self.outside)
+    }
+
+    /// The middle of the shape.
+    pub fn middle(&self) -> Point {
+        match self.shape {
+            SourceShape::Box { low, high } => (low + high) * 0.5,
+            SourceShape::Sphere { center, .. } => center,
+            SourceShape::Cylinder { ends: [a, b], .. } => (a + b) * 0.5,
+        }
     }
 
     /// The size wanted at `p` in a field of slope `beta`.

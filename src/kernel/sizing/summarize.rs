@@ -1,11 +1,14 @@
 //! Summarizes a field.
 
+use std::collections::BTreeMap;
+
+use super::constraint::SizeConstraint;
 use super::field::SizeField;
 use super::length::Length;
 use super::options::{SizeOptions, Targets};
 use super::seeds::Seeds;
 use super::summary::{SizeRange, SizeSummary, SizeWarning};
-use tetdb_base::geom::short;
+use tetdb_base::geom::{Point, short};
 use tetdb_base::storage::{OrRaise, ScratchSpace, sort_record};
 
 impl SizeField {
@@ -15,6 +18,7 @@ impl SizeField {
         seeds: &Seeds,
         targets: &Targets,
         options: &SizeOptions,
+        constraints: &[&dyn SizeConstraint],
         scratch: &ScratchSpace,
     ) -> SizeSummary {
         let side = self.frame.side;
@@ -23,10 +27,18 @@ impl SizeField {
         let middles = self.tree.leaves().enumerate().map(|(i, leaf)| {
             let values = self.values.get(i);
             let mean = values.iter().map(|&h| f64::from(h)).sum::<f64>() / 8.0;
-            (mean * side, leaf.side() * leaf.side() * leaf.side())
+            let p = self.frame.low + (leaf.low() + Point::splat(0.5 * leaf.side())) * side;
+            (self.of_sources(p).min(mean * side), leaf.side() * leaf.side() * leaf.side())
         });
-        let median = weighted_range(middles, scratch).median;
-        let (low, high) = self.range();
+        let with_sources = weighted_range(middles, scratch);
+        let median = with_sources.median;
+        let (low, mut high) = self.range();
+        let cube = [self.frame.low, self.frame.low + Point::splat(side)];
+        let middles = self.sources.iter().map(|s| s.middle().clamp(cube[0], cube[1]));
+        let low = middles.map(|p| self.of_sources(p)).fold(low.min(with_sources.low), f64::min);
+        if !self.sources.is_empty() {
+            high = with_sources.high;
+        }
         let wanted = [("hsiz", targets.hsiz), ("hmax", targets.hmax)];
         let warnings = wanted.into_iter().filter_map(|(option, wanted)| {
             let wanted = wanted?;
@@ -42,6 +54,7 @@ impl SizeField {
             let is_far_above = option == "hsiz" && wanted > FAR_ABOVE * high;
             is_far_above.then_some(SizeWarning::NeverReached { option, wanted, most: high })
         });
+        let warnings = warnings.chain(self.far_below_edges(seeds, options, constraints));
         SizeSummary {
             source: describe_source(options, targets),
             surface,
@@ -51,6 +64,42 @@ impl SizeField {
             bytes: self.bytes(),
             warnings: warnings.collect(),
         }
+    }
+
+    /// The least size that shapes ask for at a position.
+    fn of_sources(&self, p: Point) -> f64 {
+        self.sources.iter().map(|source| source.h(p, self.beta)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// One warning for each kind of shape, formula and file: the vertex where the wanted size is the least share of the edges.
+    fn far_below_edges(
+        &self,
+        seeds: &Seeds,
+        options: &SizeOptions,
+        constraints: &[&dyn SizeConstraint],
+    ) -> Vec<SizeWarning> {
+        let mut worst = BTreeMap::<&'static str, (f64, SizeWarning)>::new();
+        let mut look = |option, wanted: f64, edges: f64, at: Point| {
+            let share = wanted / edges;
+            if share < FAR_BELOW && worst.get(option).is_none_or(|(least, _)| share < *least) {
+                let warning =
+                    SizeWarning::FarBelowEdges { option, wanted, edges, at: at.to_array() };
+                worst.insert(option, (share, warning));
+            }
+        };
+        let step = seeds.h.len().div_ceil(VERTICES_ASKED).max(1);
+        for v in seeds.vertices() {
+            let (p, edges) = (seeds.points[v as usize], seeds.h(v) * self.frame.side);
+            for (asked, source) in options.sources.iter().zip(&self.sources) {
+                look(asked.option(), source.h(p, self.beta), edges, p);
+            }
+            for constraint in constraints.iter().filter(|_| (v as usize).is_multiple_of(step)) {
+                if let (Some(option), Ok(wanted)) = (constraint.option(), constraint.h(p)) {
+                    look(option, wanted, edges, p);
+                }
+            }
+        }
+        worst.into_values().map(|(_, warning)| warning).collect()
     }
 }
 
@@ -87,6 +136,9 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, scratch: &ScratchSpace
 /// Below this share of the surface's median edge, an interior size is warned about: the surface is
 /// not divided, so that large triangles would stand against small tetrahedra.
 const FAR_BELOW: f64 = 0.4;
+
+/// Vertices at which formulas and files are compared with the edges, about: some 10 ms. With few, a small place is missed.
+const VERTICES_ASKED: usize = 1 << 16;
 
 /// A wanted size above this multiple of the field's longest length is warned about: it has no effect, and is often in
 /// another unit.

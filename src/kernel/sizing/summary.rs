@@ -48,6 +48,17 @@ pub enum SizeWarning {
         /// Distance from edges of that length at which the gradation lets sizes come down to it.
         away: f64,
     },
+    /// A size wanted at a place of the surface is far below its edges there, which are kept.
+    FarBelowEdges {
+        /// The option that asks for the size.
+        option: &'static str,
+        /// The size wanted there.
+        wanted: f64,
+        /// Mean length of the edges at the place.
+        edges: f64,
+        /// The place.
+        at: [f64; 3],
+    },
     /// The wanted interior size is longer than the gradation lets sizes grow within the surface.
     NeverReached {
         /// The option that sets the size.
@@ -63,13 +74,15 @@ impl SizeWarning {
     /// The option that asks for the size.
     pub fn option(&self) -> &'static str {
         match self {
-            Self::FarBelowSurface { option, .. } | Self::NeverReached { option, .. } => option,
+            Self::FarBelowSurface { option, .. }
+            | Self::FarBelowEdges { option, .. }
+            | Self::NeverReached { option, .. } => option,
         }
     }
 
     /// Whether dividing the surface's triangles first would help.
     pub fn needs_finer_surface(&self) -> bool {
-        matches!(self, Self::FarBelowSurface { .. })
+        !matches!(self, Self::NeverReached { .. })
     }
 
     /// The sentence behind the option.
@@ -82,6 +95,12 @@ impl SizeWarning {
                 short(*surface_median),
                 short(*wanted),
                 short(*away)
+            ),
+            Self::FarBelowEdges { wanted, edges, at, .. } => format!(
+                "{} is far below the surface's edges, which are kept: they are about {} long at ({}), and tetrahedra on them are badly shaped",
+                short(*wanted),
+                short(*edges),
+                at.map(short).join(", ")
             ),
             Self::NeverReached { wanted, most, .. } => format!(
                 "{} is never reached: from the surface's edges lengths grow to {} at most (hgrad says how fast); is it in the surface's unit?",

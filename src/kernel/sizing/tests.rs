@@ -472,6 +472,38 @@ fn summaries_say_where_sizes_came_from() {
     assert!((summary.surface.median / 0.0557 - 1.0).abs() < 0.05, "{summary:?}");
 }
 
+#[test]
+fn shapes_count_in_the_summary_and_are_warned_about_on_the_surface_alone() {
+    let (points, triangles) = cube(20, |i| i as f64 / 20.0);
+    let summary = |asked: &SizeOptions| {
+        let (extra, scratch) = (ExtraSizes::default(), ScratchSpace::boundless());
+        SizeField::build_with(&points, &triangles, asked, &extra, &scratch).unwrap().1
+    };
+    let plain = summary(&SizeOptions::default());
+    let shape = |source| SizeOptions { sources: vec![source], ..SizeOptions::default() };
+    let sphere = |text: &str| shape(SizeSource::parse_sphere(text).unwrap());
+    let inside = summary(&sphere("0.5,0.5,0.5,0.001,0.01"));
+    assert!((inside.field.low / 0.01 - 1.0).abs() < 1e-9, "{inside}");
+    assert_eq!(inside.warnings, []);
+    let everywhere = summary(&sphere("0.5,0.5,0.5,9,0.01"));
+    assert_eq!([everywhere.field.low, everywhere.field.high], [0.01; 2]);
+    let of_box = shape(SizeSource::parse_box("0,0,0,0.2,0.2,0.2,0.01").unwrap());
+    let of_cylinder = shape(SizeSource::parse_cylinder("0.5,0.5,0,0.5,0.5,1,0.1,0.01").unwrap());
+    for (asked, option) in [
+        (sphere("0,0,0,0.1,0.01"), "size_sphere"),
+        (of_box, "size_box"),
+        (of_cylinder, "size_cylinder"),
+        (formula("0.01 + 0.1*z"), "size_expr"),
+    ] {
+        let found = summary(&asked);
+        assert!(found.field.low < plain.field.low, "{option}: {found}");
+        assert_eq!(found.warnings.len(), 1, "{option}");
+        let text = found.warnings[0].to_string();
+        assert!(text.starts_with(option) && text.contains("0.01 is far below"), "{text}");
+    }
+    assert_eq!(summary(&formula("0.05")).warnings, []);
+}
+
 /// `cargo test --release --lib sizing -- --ignored --nocapture`
 #[test]
 #[ignore = "prints a table for people"]

@@ -21,13 +21,21 @@ impl QuerySession {
 
     /// Tetrahedra that have all these vertices: the ball of one, the shell of an edge.
     ///
-    /// Reads vertices in order until those of the surface and of cuts are found. Errors: the store has no such vertex.
+    /// Reads vertices in order until those of the surface and of cuts are found. Errors: the store has no such
+    /// vertex; two vertices that no edge joins.
     pub fn around(&mut self, vertices: &[VertexId]) -> Result<Sharing, QueryError> {
         let mut placed = Vec::new();
         for &id in vertices {
             placed.push((id.number(), self.vertex(id)?));
         }
-        Ok(Sharing { at_least: placed.len(), vertices: placed, except: None })
+        let sharing = Sharing { at_least: placed.len(), vertices: placed, except: None };
+        if let &[a, b] = vertices {
+            let selection = Selection { sharing: Some(sharing.clone()), ..Selection::default() };
+            if self.select(selection)?.next().is_none() {
+                return Err(QueryError::NoEdge(a, b));
+            }
+        }
+        Ok(sharing)
     }
 
     /// Tetrahedra that share a face with this one. Errors: the store has no such one.
@@ -77,7 +85,7 @@ impl QuerySession {
                 break;
             }
         }
-        self.count_vertices(read);
+        self.count_vertices(rank, read);
         Ok(found)
     }
 }

@@ -24,8 +24,11 @@ pub enum QueryError {
         /// The requested id.
         id: VertexId,
     },
+    /// No edge of the mesh joins the two vertices.
+    #[error("no edge of the mesh joins {0} and {1}")]
+    NoEdge(VertexId, VertexId),
     /// The store has no such label.
-    #[error("there is no label {name:?}; there are {}", known.join(", "))]
+    #[error("there is no label {name:?}; the labels are {}", known.join(", "))]
     NoLabel {
         /// The requested label.
         name: String,
@@ -33,11 +36,11 @@ pub enum QueryError {
         known: Vec<String>,
     },
     /// The store has no such region.
-    #[error("there is no region {name:?}; there are {}", known.join(", "))]
+    #[error("there is no region {name}; the regions are {}", known.join(", "))]
     NoRegion {
         /// The requested region.
         name: String,
-        /// Names of the regions.
+        /// Names or numbers of the regions.
         known: Vec<String>,
     },
     /// No stage of the cut was kept.

@@ -122,7 +122,7 @@ impl QuerySession {
         if !is_led_near(part, candidate, lazy)? {
             return Ok(());
         }
-        self.count_tets();
+        self.count_tets(candidate.rank, candidate.chunk);
         let part = &mut self.part(candidate.rank)?.subdomain;
         let records = checked_chunk(part, candidate.chunk)?;
         let n_vertices = part.row().vertices;

@@ -28,7 +28,8 @@ pub struct Selected<'a> {
 impl QuerySession {
     /// Tetrahedra that satisfy all of `selection`, in the order of their ids.
     ///
-    /// Errors: sub-domains the store does not have; an interface that is not there.
+    /// Errors: sub-domains the store does not have; an interface that is not there; regions that
+    /// are not filled.
     pub fn select(&mut self, selection: Selection) -> Result<Selected<'_>, QueryError> {
         self.check(&selection)?;
         let ranks: Vec<u32> = self
@@ -59,6 +60,18 @@ impl QuerySession {
             if !rows.iter().any(|row| [row.low, row.high] == pair) {
                 return Err(QueryError::NoInterface(a, b));
             }
+        }
+        let regions = match selection.regions {
+            Some(_) => self.store.regions()?,
+            None => Vec::new(),
+        };
+        let is_known = |region: u32| regions.iter().any(|row| row.filled && row.region == region);
+        if let Some(region) =
+            selection.regions.iter().flatten().find(|&&r| !regions.is_empty() && !is_known(r))
+        {
+            let filled = regions.iter().filter(|row| row.filled);
+            let known = filled.map(|row| row.region.to_string()).collect();
+            return Err(QueryError::NoRegion { name: region.to_string(), known });
         }
         for &id in selection.tets.iter().flatten() {
             let row = self.rows.iter().find(|r| r.rank == id.subdomain().rank());

@@ -1,5 +1,6 @@
 //! Open sub-domains and decoded chunks while questions are answered, within a budget.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use lru::LruCache;
@@ -28,13 +29,13 @@ const SUMMARY_BYTES: u64 = 256;
 /// Cost of questions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Measures {
-    /// Chunks of tetrahedra read, and of vertices; one read twice counts twice.
+    /// Chunks of tetrahedra read; one read twice counts once.
     pub tet_chunks_read: u64,
-    /// Chunks of vertices read.
+    /// Chunks of vertices read; one read twice counts once.
     pub vertex_chunks_read: u64,
-    /// Chunks of facets and interface faces read.
+    /// Chunks of facets and interface faces read; one read twice counts twice.
     pub face_chunks_read: u64,
-    /// Chunks of tetrahedra and of vertices in the store.
+    /// Chunks of tetrahedra in the store.
     pub tet_chunks: u64,
     /// Chunks of vertices in the store.
     pub vertex_chunks: u64,
@@ -96,6 +97,8 @@ pub struct QuerySession {
     /// Faces on the surface of the last sub-domain whose excess was needed.
     pub(super) surface: Option<Arc<SurfaceFaces>>,
     measures: Measures,
+    /// Chunks of tetrahedra and of vertices read, by rank and number.
+    chunks_read: [HashSet<(u32, u32)>; 2],
     /// The plane of the cut, of a mesh that was kept on its way.
     cutting: Option<[Point; 2]>,
     _lease: Lease,
@@ -167,6 +170,7 @@ impl QuerySession {
             budget: budget.clone(),
             surface: None,
             measures,
+            chunks_read: Default::default(),
             cutting: None,
             _lease: lease,
         })
@@ -179,11 +183,16 @@ impl QuerySession {
 
     /// Cost of all questions so far.
     pub fn measures(&self) -> Measures {
-        let mut sum = self.measures;
-        for (_, part) in &self.parts {
-            sum.vertex_chunks_read += part.subdomain.vertex_chunks_read();
+        let [tets, vertices] = &self.chunks_read;
+        let mut vertices = vertices.clone();
+        for (&rank, part) in &self.parts {
+            vertices.extend(part.subdomain.vertex_chunks_read().map(|chunk| (rank, chunk)));
         }
-        sum
+        Measures {
+            tet_chunks_read: tets.len() as u64,
+            vertex_chunks_read: vertices.len() as u64,
+            ..self.measures
+        }
     }
 
     /// The box of the mesh.
@@ -205,10 +214,11 @@ impl QuerySession {
     pub fn part(&mut self, rank: u32) -> Result<&mut OpenSubdomain, QueryError> {
         if !self.parts.contains(&rank) {
             while self.parts.len() >= self.parts_max {
-                let Some((_, part)) = self.parts.pop_lru() else {
+                let Some((old, part)) = self.parts.pop_lru() else {
                     break;
                 };
-                self.measures.vertex_chunks_read += part.subdomain.vertex_chunks_read();
+                let read = part.subdomain.vertex_chunks_read();
+                self.chunks_read[1].extend(read.map(|chunk| (old, chunk)));
             }
             let row = self.rows.iter().find(|row| row.rank == rank);
             let row = match row {
@@ -262,7 +272,7 @@ impl QuerySession {
         keep: impl FnMut(&Subdomain, u32, &SealedTet) -> bool,
     ) -> Result<DecodedChunk, QueryError> {
         check_cancelled();
-        self.measures.tet_chunks_read += 1;
+        self.count_tets(rank, chunk);
         let part = &mut self.part(rank)?.subdomain;
         let records = checked_chunk(part, chunk)?;
         Ok(DecodedChunk::new(part, &records, keep)?)
@@ -285,13 +295,13 @@ impl QuerySession {
     }
 
     /// Counts a chunk of tetrahedra read elsewhere.
-    pub fn count_tets(&mut self) {
-        self.measures.tet_chunks_read += 1;
+    pub fn count_tets(&mut self, rank: u32, chunk: u32) {
+        self.chunks_read[0].insert((rank, chunk));
     }
 
-    /// Counts chunks of vertices read elsewhere.
-    pub fn count_vertices(&mut self, chunks: u64) {
-        self.measures.vertex_chunks_read += chunks;
+    /// Counts the first chunks of vertices of a sub-domain, read elsewhere.
+    pub fn count_vertices(&mut self, rank: u32, chunks: u32) {
+        self.chunks_read[1].extend((0..chunks).map(|chunk| (rank, chunk)));
     }
 
     /// Counts a chunk of faces read elsewhere.

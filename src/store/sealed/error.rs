@@ -1,3 +1,5 @@
+//! Errors of the file of a sealed sub-domain.
+
 use std::path::{Path, PathBuf};
 
 use tetdb_schema::chunk::ChunkError;

@@ -147,8 +147,8 @@ impl Subdomain {
     }
 
     /// Chunks of vertices read so far.
-    pub fn vertex_chunks_read(&self) -> u64 {
-        self.cache.loads()
+    pub fn vertex_chunks_read(&self) -> impl Iterator<Item = u32> {
+        self.cache.chunks_read()
     }
 
     /// The chunk a vertex is in.

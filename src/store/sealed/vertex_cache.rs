@@ -82,7 +82,8 @@ pub struct VertexCache {
     last: [ResidentChunk; 2],
     bytes: usize,
     bytes_max: usize,
-    loads: u64,
+    /// By chunk, whether it was ever read.
+    is_read: Vec<bool>,
 }
 
 impl VertexCache {
@@ -101,6 +102,7 @@ impl VertexCache {
             generation,
             places: vec![NOT_RESIDENT; firsts.len()],
             referenced: vec![false; firsts.len()],
+            is_read: vec![false; firsts.len()],
             firsts,
             n_vertices,
             resident: Vec::new(),
@@ -111,13 +113,12 @@ impl VertexCache {
             last: [ResidentChunk::EMPTY; 2],
             bytes: 0,
             bytes_max,
-            loads: 0,
         })
     }
 
     /// Chunks read so far.
-    pub fn loads(&self) -> u64 {
-        self.loads
+    pub fn chunks_read(&self) -> impl Iterator<Item = u32> {
+        (0..).zip(&self.is_read).filter(|(_, is_read)| **is_read).map(|(chunk, _)| chunk)
     }
 
     /// The chunk vertex `v` is in; of a number no vertex has, the last one.
@@ -195,7 +196,7 @@ impl VertexCache {
             chunk: chunk as u32,
         };
         let first = self.loader.load(file, address, &mut self.scratch)?;
-        self.loads += 1;
+        self.is_read[chunk] = true;
         if first != self.firsts[chunk] {
             let expected = self.firsts[chunk];
             let what = format!("vertex chunk {chunk} starts at {first}, expected {expected}");

@@ -1,3 +1,5 @@
+//! Errors of the catalog.
+
 use std::path::PathBuf;
 
 use thiserror::Error;

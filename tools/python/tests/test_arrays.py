@@ -11,6 +11,7 @@ import pytest
 from conftest import OPTIONS, SPEC
 
 import tetdb
+from tetdb._errors import of_code
 
 
 def volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
@@ -136,6 +137,13 @@ def test_handles_and_surfaces_survive_pickling(parts: tetdb.Store) -> None:
     assert (again.points == surface.points).all() and (again.labels == surface.labels).all()
     error = tetdb.SurfaceError("open-surface", "open", "triangle 0", "close it")
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
+
+@pytest.mark.parametrize(
+    "code", ["bad-seed", "sheet-outside", "wire-outside", "wire-contact", "wire-too-near", "degenerate-edge", "duplicate-wire"]
+)
+def test_codes_of_what_is_inside_a_surface_are_surface_errors(code: str) -> None:
+    assert isinstance(of_code(code, "it was refused"), tetdb.SurfaceError)
 
 
 def test_subdomains_are_meshed_again_and_brought_back(tmp_path: Path) -> None:

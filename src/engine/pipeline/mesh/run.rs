@@ -9,8 +9,8 @@ use super::coarse::{CoarseReport, inserted, recovered};
 use super::commit::{close, commit_subdomain, subdomain_order};
 use super::head_start::{HeadStart, head_start};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::plan::estimate::n_subdomains;
 use crate::pipeline::plan::leases::Leases;
+use crate::pipeline::plan::subdomains::n_subdomains;
 use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::journal;
@@ -178,7 +178,7 @@ impl<'a> Run<'a> {
         } else {
             drop(surface);
         }
-        self.n = tree::n_subdomains(self.catalog)?;
+        self.n = tree::recorded_n_subdomains(self.catalog)?;
         if is_given {
             held = held.without_surface(self.options, budget)?;
             self.plan = held.plan;

@@ -8,6 +8,7 @@
 //! - `balls,count=1000`: 4.04 million tetrahedra on 506,000 triangles.
 
 use super::regions::{refuse_outer_points, refuse_outer_sheets, region_sizes};
+use super::subdomains::n_subdomains;
 use super::{MEMORY_MIN, Options, Plan};
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::{ScratchSpace, attempt, join};
@@ -32,17 +33,6 @@ const SIZES_VERTEX: usize = 26;
 const ROOM_FOR_BOTH: usize = 8 * 160;
 /// Bytes for frames of data outside memory, and for lists of a quarter of a million points.
 const PREPARE_LEAST: usize = 16 << 20;
-/// Most tetrahedra of a sub-domain where an automatic number of sub-domains is two or more. Cuts are expensive: 21 million
-/// tetrahedra in ten sub-domains take a tenth to a fifth longer than in four, with caps from 128 MiB on. The first cut runs
-/// alone, however many follow.
-const TETS_PER_SUBDOMAIN: f64 = (5u64 << 20) as f64;
-/// Like `TETS_PER_SUBDOMAIN`, for a mesh so large that it has [`MANY`] sub-domains in any case. 41 million tetrahedra take less
-/// time in four sub-domains than in ten, within 1 GiB too.
-const TETS_PER_SUBDOMAIN_MAX: f64 = 2.0 * TETS_PER_SUBDOMAIN;
-/// Most tetrahedra of a mesh that stays in one sub-domain by default. Two threads are faster on two sub-domains than within one.
-const TETS_ALONE: f64 = (2u64 << 20) as f64;
-/// Number of sub-domains from which on threads and machines have enough of them to share.
-const MANY: f64 = 32.0;
 /// Ratio of inner tetrahedra without optimization, and with only the Delaunay part of it, to those with full optimization.
 /// Measured: 1.072 and 1.083; 1.023 and 1.026.
 const UNOPTIMIZED: f64 = 1.078;
@@ -437,21 +427,6 @@ fn least_to_prepare(surface: &Surface, regions_have_sizes: bool) -> u64 {
     (surface.bytes() + beside + PREPARE_LEAST) as u64
 }
 
-/// Number of sub-domains for a mesh of `tets` tetrahedra, and the requested number if that is larger.
-pub fn n_subdomains(tets: f64, options: &Options) -> (u32, Option<u32>) {
-    let requested = options.mesh.subdomains.count();
-    let each = (tets / MANY).clamp(TETS_PER_SUBDOMAIN, TETS_PER_SUBDOMAIN_MAX);
-    // The number is even: three sub-domains take longer on two threads than two or four.
-    let auto = match tets > TETS_ALONE {
-        true => 2.0 * (0.5 * tets / each).ceil(),
-        false => 1.0,
-    };
-    let most = (tets / options.run.subdomain_tets_min()).floor().max(1.0);
-    let wanted = requested.map_or(auto, f64::from);
-    let n = wanted.min(most).min(f64::from(1u32 << 20)) as u32;
-    (n, requested.filter(|_| wanted > most && wanted > 1.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -478,18 +453,6 @@ mod tests {
         // The ledger has recorded the bytes that the field holds, and no more.
         assert!(made.field.bytes() as u64 <= wide.estimate.octree_bytes + (1 << 20));
         Ok(())
-    }
-
-    #[test]
-    fn a_large_mesh_has_fewer_subdomains_for_its_size() {
-        let options = Options::default();
-        // From 32 sub-domains on they grow to twice the size, then their number grows.
-        let shares = [(0.6, 2), (2.0, 2), (2.1, 4), (10.0, 10), (32.0, 32), (48.0, 32)];
-        for (shares, n) in shares.into_iter().chain([(500.0, 250)]) {
-            assert_eq!(n_subdomains(shares * TETS_PER_SUBDOMAIN, &options).0, n);
-        }
-        assert_eq!(n_subdomains(TETS_ALONE, &options).0, 1);
-        assert_eq!(n_subdomains(1.01 * TETS_ALONE, &options).0, 2);
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Decisions before anything is written: options, the size field, the estimate from it, and shares of the memory cap.
+//! Decisions before anything is written: options, the size field, the estimate from it, the number of sub-domains, and shares of
+//! the memory cap.
 
 pub(super) mod estimate;
 mod forecast;
@@ -8,6 +9,7 @@ mod option_text;
 mod options;
 mod recipe;
 mod regions;
+pub(super) mod subdomains;
 
 pub use estimate::{Estimate, Prepared, least_for, prepare};
 pub use memory::{MEMORY_MIN, Plan};

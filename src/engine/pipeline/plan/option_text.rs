@@ -340,3 +340,47 @@ fn texts<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
     let all = Vec::<Typed>::deserialize(from)?;
     Ok(all.into_iter().map(|Typed(text)| text).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every key with a value other than the default. A new field does not compile here until it is added.
+    fn full() -> OptionsText {
+        let some = |text: &str| Some(text.to_owned());
+        let list = |text: &str| vec![text.to_owned()];
+        OptionsText {
+            hsiz: some("0.1"),
+            hmin: some("0.01"),
+            hmax: some("3%"),
+            hgrad: some("1.5"),
+            size_box: list("0,0,0,1,1,1,0.1"),
+            size_sphere: list("0,0,0,1,0.1,2%"),
+            size_cylinder: list("0,0,0,1,1,1,2,0.1"),
+            size_region: list("rock,0.2"),
+            size_expr: some("x + 1"),
+            size_field: some("/a/sizes.sol"),
+            size_field_hash: some("12"),
+            regions: some("all"),
+            region_seed: list("0,0,0,rock"),
+            hole: list("1,0,0"),
+            region_name: list("0,0,1,ore"),
+            optimize: some("none"),
+            subdomains: some("4"),
+            drop_coarse: true,
+            seal: some("none"),
+            keep_stages: true,
+            refine_surface: true,
+        }
+    }
+
+    #[test]
+    fn every_option_survives_each_conversion() {
+        let options: MeshOptions = full().try_into().expect("options");
+        assert_eq!(OptionsText::from(options), full(), "typed and back");
+        assert_eq!(OptionsText::default().overridden_by(full()), full(), "all overridden");
+        assert_eq!(full().overridden_by(OptionsText::default()), full(), "none overridden");
+        let text = serde_json::to_string(&full()).expect("text");
+        assert_eq!(serde_json::from_str::<OptionsText>(&text).expect("options"), full());
+    }
+}

@@ -21,7 +21,7 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
     if before.is_empty() {
         return Err(PipelineError::NothingToUndo { path: catalog.dir().to_owned() });
     }
-    let n = tree::n_subdomains(catalog)?;
+    let n = tree::recorded_n_subdomains(catalog)?;
     let (mut parts, mut totals, mut blobs) = (Vec::new(), BTreeMap::new(), Vec::new());
     for row in before {
         let rank = row.rank;

@@ -110,7 +110,7 @@ impl<'a> RemeshRun<'a> {
             field: Arc::new(recorded_field(catalog, options, &room(catalog, budget)?)?),
             last,
             steps: catalog.journal()?.len() as u32,
-            n: tree::n_subdomains(catalog)?,
+            n: tree::recorded_n_subdomains(catalog)?,
             catalog,
             options,
             what,

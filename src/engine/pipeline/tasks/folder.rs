@@ -111,7 +111,7 @@ impl TaskFolder {
         };
         let bytes = patience
             .until(|| read(&path))?
-            .ok_or_else(|| no_plan("nobody has planned tasks for it".to_owned()))?;
+            .ok_or_else(|| no_plan("it has no plan of tasks".to_owned()))?;
         let plan: PlanRecord =
             from_bytes(WorkKind::Plan, &bytes).map_err(|e| no_plan(format!("its plan: {e}")))?;
         match plan.recipe {

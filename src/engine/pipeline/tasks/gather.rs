@@ -69,7 +69,7 @@ pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), Pipe
         let mut plan = PlanRecord {
             run: RandomState::new().hash_one(std::process::id()),
             recipe: RECIPE,
-            n: tree::n_subdomains(catalog)?,
+            n: tree::recorded_n_subdomains(catalog)?,
             tasks,
             bounds: [bounds.low, bounds.high].map(|p| p.to_array()),
             options: options.to_owned(),

@@ -99,6 +99,13 @@ _CLASSES: dict[str, type[TetdbError]] = {
         "nothing-filled",
         "contradicting-orientation",
         "surface-changed",
+        "bad-seed",
+        "sheet-outside",
+        "wire-outside",
+        "degenerate-edge",
+        "duplicate-wire",
+        "wire-contact",
+        "wire-too-near",
     ),
     SurfaceError,
 )
