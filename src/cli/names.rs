@@ -36,6 +36,6 @@ pub fn names(command: &Command) -> Vec<(&'static str, String)> {
 /// The surfaces of a command as a shell reads them; `None` where they are not all of it, or are read from a pipe.
 fn plain(surfaces: &[String], sheets: &SheetArgs) -> Option<String> {
     let is_all = sheets.files().next().is_none() && !surfaces.iter().any(|file| file == "-");
-    let quoted: Vec<String> = surfaces.iter().map(|file| quoted(file)).collect();
+    let quoted: Vec<String> = surfaces.iter().map(quoted).collect();
     is_all.then(|| quoted.join(" "))
 }
