@@ -8,8 +8,8 @@ use std::collections::HashMap;
 
 use super::box_pairs::tree_of;
 use super::embedded_contact::{has_area, is_on_edge, point_at_triangle};
+use super::point_table::PointTable;
 use super::split::swap_inside;
-use super::weld::PointTable;
 use super::{EmbeddedSet, Surface, SurfaceError};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;

@@ -10,7 +10,7 @@ use super::embedded_contact::{
     EdgeAtTriangle, EmbeddedEdge, has_area, is_on_edge, point_at_triangle,
 };
 use super::embedded_set::{EmbedError, Embedded, EmbeddedSet};
-use super::weld::PointTable;
+use super::point_table::PointTable;
 use super::{BoxTree, Surface, SurfaceError};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;

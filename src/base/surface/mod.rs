@@ -26,6 +26,7 @@ mod embedded_set;
 mod fitness;
 mod orientation;
 mod point_sizes;
+mod point_table;
 mod point_tree;
 mod polygon;
 mod repair;

@@ -1,7 +1,8 @@
 //! Embedded sheets: triangles that become faces of the mesh with the same volume on both sides.
 
 use super::edges::{Facets, TriangleAtEdge};
-use super::weld::{PointTable, drop_unused_labels, drop_unused_points};
+use super::point_table::PointTable;
+use super::weld::{drop_unused_labels, drop_unused_points};
 use super::{SourceFile, Surface, SurfaceError};
 use crate::storage::ScratchSpace;
 

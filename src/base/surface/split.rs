@@ -455,7 +455,7 @@ mod tests {
         let asked = std::cell::Cell::new(0u64);
         let h = |_: Point| {
             asked.set(asked.get() + 1);
-            1e-5
+            2e-4
         };
         let error = split(&cube(), &h, 1 << 30).unwrap_err();
         assert!(matches!(error, SurfaceError::SplitMemory { .. }), "{error}");

@@ -105,10 +105,10 @@ pub fn take_seeds(options: &mut MeshOptions, surface: &surface::Surface) -> Opti
         options.sizes.regions.extend(sizes);
     }
     let what = match surface.fills_rest {
-        true => "every region without a hole point",
-        false => "the regions of its solid elements",
+        true => "every region without a hole point is filled",
+        false => "the regions of their solid elements are filled",
     };
-    is_default.then(|| format!("regions are those of the surface's files: filled is {what}"))
+    is_default.then(|| format!("as the surface's files say, {what}"))
 }
 
 /// Reads the size file of identified options, in at most half of `cap`. Sizes that were given as arrays are in `store`.

@@ -537,7 +537,7 @@ pub fn divide(
     let h = |p| sizes.h(p).min(wanted);
     let predicted = surface::predict_split(&surface.inner, &h);
     if predicted > 2.0 * before as f64 {
-        settings.note(format!("dividing the surface into about {predicted:.0} triangles"));
+        settings.note(format!("the surface will have about {predicted:.3e} triangles"));
     }
     surface.divide(&h, cap, &scratch)?;
     settings.note(format!(

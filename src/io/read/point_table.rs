@@ -33,7 +33,7 @@ pub struct PointRow {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Column {
+enum Meaning {
     Number(usize),
     Name,
     /// Whole numbers count the lines and say nothing else; other words are names if no column is.
@@ -46,7 +46,7 @@ struct Dialect {
     /// A space stands for any number of blanks and tabs, each word with or without a comma behind it.
     separator: char,
     decimal_comma: bool,
-    columns: Vec<Column>,
+    columns: Vec<Meaning>,
     /// A name may follow the columns.
     is_open: bool,
 }
@@ -96,19 +96,19 @@ impl Dialect {
         };
         for (k, column) in self.columns.iter().enumerate() {
             match (fields.get(k), column) {
-                (None, Column::Name) => {}
+                (None, Meaning::Name) => {}
                 (None, _) => return Err(Misfit::TooFew(k)),
-                (Some(word), Column::Number(axis)) => {
+                (Some(word), Meaning::Number(axis)) => {
                     let number = self.number(word);
                     values.0[*axis] = number.ok_or_else(|| Misfit::NoNumber((*word).to_owned()))?;
                 }
-                (Some(word), Column::Name) => values.1 = name_of(&[word]),
-                (Some(_), Column::Id) => {}
+                (Some(word), Meaning::Name) => values.1 = name_of(&[word]),
+                (Some(_), Meaning::Id) => {}
             }
         }
         let rest = fields.get(self.columns.len()..).unwrap_or_default();
         let rest = &rest[..rest.iter().rposition(|f| !f.is_empty()).map_or(0, |k| k + 1)];
-        let ends_with_name = self.columns.last() == Some(&Column::Name);
+        let ends_with_name = self.columns.last() == Some(&Meaning::Name);
         match (rest.len(), self.separator) {
             (0, _) => {}
             (1, _) if self.is_open => values.1 = name_of(rest),
@@ -121,7 +121,7 @@ impl Dialect {
 
     /// The word of the column `id`, if it is no whole number.
     fn named_by_id(&self, text: &str) -> bool {
-        let id = self.columns.iter().position(|c| *c == Column::Id);
+        let id = self.columns.iter().position(|c| *c == Meaning::Id);
         let fields = self.fields(text);
         id.and_then(|k| fields.get(k)).is_some_and(|word| word.parse::<i64>().is_err())
     }
@@ -146,12 +146,12 @@ impl Dialect {
             let fields = dialect.fields(&bare);
             for field in fields.iter().map(|f| f.trim_end_matches(',').trim_matches('"').trim()) {
                 let column = match field {
-                    "x" | "points:0" | "points_0" => Column::Number(0),
-                    "y" | "points:1" | "points_1" => Column::Number(1),
-                    "z" | "points:2" | "points_2" => Column::Number(2),
-                    "h" | "size" | "length" if columns == PointColumns::Sized => Column::Number(3),
-                    "name" | "label" | "group" => Column::Name,
-                    "id" | "nr" | "no" | "number" | "index" => Column::Id,
+                    "x" | "points:0" | "points_0" => Meaning::Number(0),
+                    "y" | "points:1" | "points_1" => Meaning::Number(1),
+                    "z" | "points:2" | "points_2" => Meaning::Number(2),
+                    "h" | "size" | "length" if columns == PointColumns::Sized => Meaning::Number(3),
+                    "name" | "label" | "group" => Meaning::Name,
+                    "id" | "nr" | "no" | "number" | "index" => Meaning::Id,
                     _ => {
                         other.get_or_insert_with(|| field.to_owned());
                         continue;
@@ -163,14 +163,14 @@ impl Dialect {
                 dialect.columns.push(column);
             }
             let n = if columns == PointColumns::Sized { 4 } else { 3 };
-            if (0..n).any(|axis| !dialect.columns.contains(&Column::Number(axis))) {
+            if (0..n).any(|axis| !dialect.columns.contains(&Meaning::Number(axis))) {
                 continue;
             }
             if other.is_some() {
                 unknown = unknown.or(other);
                 continue;
             }
-            dialect.is_open = !dialect.columns.contains(&Column::Name) && n == 3;
+            dialect.is_open = !dialect.columns.contains(&Meaning::Name) && n == 3;
             found.push(dialect);
         }
         match unknown {
@@ -181,14 +181,14 @@ impl Dialect {
 
     /// All dialects of files that do not name their columns, the usual ones first.
     fn unnamed(columns: PointColumns) -> Vec<Self> {
-        let numbers = |n| (0..n).map(Column::Number).collect::<Vec<_>>();
+        let numbers = |n| (0..n).map(Meaning::Number).collect::<Vec<_>>();
         let layouts = match columns {
             PointColumns::Named => {
-                vec![(numbers(3), true), ([vec![Column::Name], numbers(3)].concat(), false)]
+                vec![(numbers(3), true), ([vec![Meaning::Name], numbers(3)].concat(), false)]
             }
             PointColumns::Sized => vec![(numbers(4), false)],
         };
-        let dialect = |(columns, is_open): (Vec<Column>, bool)| {
+        let dialect = |(columns, is_open): (Vec<Meaning>, bool)| {
             SEPARATORS.map(|separator| Self {
                 separator,
                 decimal_comma: false,
@@ -209,12 +209,12 @@ impl Dialect {
     /// A line as this dialect reads it, in words.
     fn show(&self, (numbers, name): &Values) -> String {
         let words = self.columns.iter().filter_map(|column| match column {
-            Column::Number(axis) => {
+            Meaning::Number(axis) => {
                 Some(format!("{} {}", ["x", "y", "z", "h"][*axis], numbers[*axis]))
             }
-            Column::Name if name.is_empty() => None,
-            Column::Name => Some(format!("name or number {name}")),
-            Column::Id => None,
+            Meaning::Name if name.is_empty() => None,
+            Meaning::Name => Some(format!("name or number {name}")),
+            Meaning::Id => None,
         });
         let mut words: Vec<String> = words.collect();
         if self.is_open && !name.is_empty() {
@@ -311,9 +311,9 @@ impl PointTable {
             next = self.text()?;
         }
         for (dialect, is_name) in left.iter_mut().zip(named_by_id) {
-            let id = dialect.columns.iter_mut().find(|c| **c == Column::Id).filter(|_| is_name);
+            let id = dialect.columns.iter_mut().find(|c| **c == Meaning::Id).filter(|_| is_name);
             if let Some(id) = id.filter(|_| dialect.is_open) {
-                (*id, dialect.is_open) = (Column::Name, false);
+                (*id, dialect.is_open) = (Meaning::Name, false);
             }
         }
         self.refuse_two_readings(&left)?;

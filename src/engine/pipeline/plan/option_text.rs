@@ -222,7 +222,7 @@ impl From<MeshOptions> for OptionsText {
         };
         let seal = Some(options.seal).filter(|&seal| seal != Default::default());
         Self {
-            regions: Some(rule.policy.word().to_owned()),
+            regions: rule.is_given.then(|| rule.policy.word().to_owned()),
             region_seed: seeds(false),
             hole: seeds(true),
             region_name: rule.names.iter().map(Seed::to_string).collect(),
