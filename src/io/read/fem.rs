@@ -98,7 +98,7 @@ impl<'a, 'b> Elements<'a, 'b> {
         place: &FilePlace,
     ) -> Result<()> {
         let words = text.split(',').filter(|w| !w.trim().is_empty());
-        let tags = words.map(|w| whole_number(w, place)).collect::<Result<Vec<i64>>>()?;
+        let tags = words.map(|w| integer(w, place)).collect::<Result<Vec<i64>>>()?;
         let (id, tags) = tags.split_first().ok_or_else(|| unexpected(place, "an element", text))?;
         let is = |prefixes: &[&str]| prefixes.iter().any(|p| kind.starts_with(p));
         let n = tags.len();
@@ -154,7 +154,7 @@ fn real(text: &str, place: &FilePlace) -> Result<f64> {
     number.ok_or_else(|| super::feed::not_a_number(place, "a coordinate", text.as_bytes()))
 }
 
-fn whole_number(text: &str, place: &FilePlace) -> Result<i64> {
+fn integer(text: &str, place: &FilePlace) -> Result<i64> {
     let number = parse(text.trim().as_bytes());
     number.ok_or_else(|| unexpected(place, "a whole number", text))
 }
@@ -224,7 +224,7 @@ pub(super) fn read_abaqus<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSin
                     let word = words.get(k + 1).map(|w| w.trim()).filter(|w| !w.is_empty());
                     *x = word.map_or(Ok(0.0), |w| real(w, &place))?;
                 }
-                mesh.node(whole_number(words[0], &place)?, xyz, &place)?;
+                mesh.node(integer(words[0], &place)?, xyz, &place)?;
             }
             "*ELEMENT" => {
                 while text.ends_with(',') {
@@ -296,7 +296,7 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
                 }
                 let x =
                     |k: usize| if field(k).is_empty() { Ok(0.0) } else { real(field(k), &place) };
-                mesh.node(whole_number(field(1), &place)?, [x(3)?, x(4)?, x(5)?], &place)?;
+                mesh.node(integer(field(1), &place)?, [x(3)?, x(4)?, x(5)?], &place)?;
                 0
             }
             "CTRIA3" | "CTRIAR" | "CTRIA6" => 3,
@@ -314,12 +314,11 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
             }
             _ => 0i32,
         };
-        let tags =
-            (0..n_corners.unsigned_abs() as usize).map(|k| whole_number(field(3 + k), &place));
+        let tags = (0..n_corners.unsigned_abs() as usize).map(|k| integer(field(3 + k), &place));
         let tags = tags.collect::<Result<Vec<i64>>>()?;
         let property = field(2).to_owned();
         if n_corners > 0 {
-            let id = whole_number(field(1), &place)?;
+            let id = integer(field(1), &place)?;
             let n_nodes =
                 if ["CTRIA6", "CQUAD8"].contains(&card[0].as_str()) { 8 } else { tags.len() };
             mesh.face(id, &tags, n_nodes, property, &place);
@@ -413,7 +412,7 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
 }
 
 fn numbers(text: &str, place: &FilePlace) -> Result<Vec<i64>> {
-    text.split_whitespace().map(|w| whole_number(w, place)).collect()
+    text.split_whitespace().map(|w| integer(w, place)).collect()
 }
 
 /// A line of a file and its place.
