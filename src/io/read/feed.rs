@@ -4,7 +4,7 @@ use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
 
 use super::error::{FilePlace, ReadError, ReadFault, Spot};
 use super::words::COORDINATE_MAX;
-pub(super) use super::words::{check_point, name, not_a_number, parse, quote};
+pub(super) use super::words::{check_point, name, not_a_number, parse, quote, text};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{SurfaceBuilder, SurfaceError};
 

@@ -168,7 +168,7 @@ fn line<R: BufRead>(feed: &mut Feed<R>, comment: &str) -> Result<Option<(String,
         if !feed.read_line(&mut bytes)? {
             return Ok(None);
         }
-        let text = String::from_utf8_lossy(&bytes).trim_end().to_owned();
+        let text = super::feed::text(&bytes).trim_end().to_owned();
         if !text.trim().is_empty() && !text.starts_with(comment) {
             return Ok(Some((text, place)));
         }
