@@ -29,7 +29,7 @@ import tempfile
 import numpy as np
 
 THIN, SOLID, CURVED = r"(lines|edges|beams|points)\b.* left out", r"(solid elements|tetrahedra|hexahedra).* left out", r"curved faces"
-NAMES = ["wall", "Wall 2", "Außenwand", "Außenwänd", "côté-1", "in.let"]
+NAMES = ["wall", "Wall 2", "Außenwänd", "Außenwönd", "côté-1", "in.let"]
 
 
 class Body:
@@ -255,7 +255,7 @@ def vtk(f, _):
     table = lambda word, cells: f"{word} {len(cells)} {sum(len(c) + 1 for c in cells)}\n" + "".join(f.row(len(c), *c) for c in cells)
     out += (table("LINES", lines) if lines else "") + table("POLYGONS", [face for face, _ in rows])
     data = f.maybe(f"CELL_DATA {len(rows) + len(lines)}\nSCALARS region int 1\nLOOKUP_TABLE default\n" + "0\n" * (len(rows) + len(lines)))
-    f.need("region", data)
+    f.need("values at cells", data)
     return out + data
 
 
@@ -293,7 +293,8 @@ def nas(f, _):
         rows = [fields[k:k + per] for k in range(0, len(fields), per)]
         return "\n".join((name + star if k == 0 else star).ljust(8) + "".join(x.ljust(width) for x in row) for k, row in enumerate(rows)) + "\n"
 
-    real = lambda x: f.rng.choice([f"{x:.4f}"[:8], f"{x:.1f}" if x == round(x, 1) else f"{x:.4f}"[:8]])
+    # A full field before a tab is refused.
+    real = lambda x: f.rng.choice([f"{x:.4f}"[:8 if f.rng.random() < 0.02 or style != "tabs" else 7], f"{x:.3f}"[:7]])
     nodes = "".join(card("GRID", k + 1, "", *map(real, p)) + f.maybe("$ x\n", 0.1) for k, p in enumerate(f.points))
     elements = "".join(card({3: "CTRIA3", 4: "CQUAD4"}[len(face)], next(count), i + 1, *[v + 1 for v in face]) for face, i in f.faces)
     elements += "".join(card(f.rng.choice(["CBAR", "CROD", "CTUBE"]), next(count), 9, a + 1, b + 1) for a, b in f.need(THIN, f.lines_at))

@@ -86,16 +86,16 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Resul
     if mesh.n_curved > 0 {
         mesh.target.builder.note(NoteKind::CurvedFaces { n: mesh.n_curved });
     }
-    if mesh.n_thin > 0 {
-        let what = "lines and points";
-        mesh.target.builder.note(NoteKind::SkippedElements { what, n: mesh.n_thin });
-    }
     if !mesh.other_groups.is_empty() {
         let names: Vec<String> = mesh.other_groups.iter().map(|&g| mesh.group_name(g)).collect();
         mesh.target.builder.note(NoteKind::OtherGroups { names: names.join(", ") });
     }
     mesh.target.leave_out_cells(mesh.solids.len());
     std::mem::take(&mut mesh.solids).finish("solid elements", mesh.target);
+    if mesh.n_thin > 0 {
+        let what = "lines and points";
+        mesh.target.builder.note(NoteKind::SkippedElements { what, n: mesh.n_thin });
+    }
     mesh.target.end_cells(&mesh.numbers.feed)?;
     mesh.numbers.feed.finish(mesh.target.builder)
 }

@@ -255,7 +255,7 @@ impl<R: BufRead> MeditNumbers<R> {
     /// The number of elements in a section that is skipped; 0 where a text has none.
     pub fn skipped_count(&mut self) -> Result<u64> {
         if let Encoding::Binary { .. } = self.encoding {
-            return self.count("solid elements", 0, 5);
+            return self.count("elements", 0, 3);
         }
         let has_none = !self.feed.at_end()?
             && self.feed.peek()?.is_some_and(|byte| byte.is_ascii_alphabetic());

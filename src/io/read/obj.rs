@@ -7,7 +7,7 @@ use std::io::BufRead;
 
 use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::feed::{Feed, not_a_number, parse, quote};
-use super::{FilePlace, ReadError, ReadFault, Result, SurfaceSink};
+use super::{FilePlace, ReadError, ReadFault, Result, Spot, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
 
@@ -41,6 +41,26 @@ impl Names {
     }
 }
 
+/// Words of lines that neither add nor name faces, the empty one among them.
+const IGNORED: [&[u8]; 16] = [
+    b"",
+    b"vn",
+    b"vt",
+    b"vp",
+    b"s",
+    b"mg",
+    b"mtllib",
+    b"usemap",
+    b"maplib",
+    b"lod",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"shadow_obj",
+    b"trace_obj",
+    b"end",
+];
+
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut names = Names::default();
     let mut label = None;
@@ -48,7 +68,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     let mut corners = Vec::new();
     // Vertex numbers beyond those known when they were named, each larger than the one before.
     let mut ahead: Vec<(u32, FilePlace)> = Vec::new();
-    let mut n_lines_points = 0;
+    let (mut n_lines_points, mut n_unknown, mut unknown) = (0, 0, None);
     loop {
         let place = feed.place();
         line.clear();
@@ -84,8 +104,17 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                 let what = "a free-form curve or surface".to_owned();
                 return Err(place.refuse(ReadFault::Unsupported(what)));
             }
-            _ => {}
+            word if IGNORED.contains(&word) => {}
+            word => {
+                unknown.get_or_insert_with(|| (quote(word), place.spot));
+                n_unknown += 1;
+            }
         }
+    }
+    if let Some((word, Spot::Line(line))) = unknown {
+        let left_out = "lines of no known kind were left out, the first one";
+        let what = format!("{n_unknown} {left_out} {word} in line {line}");
+        target.builder.note(NoteKind::Said(what));
     }
     let known = target.builder.n_file_vertices() as u32;
     if let Some((index, place)) = ahead.into_iter().find(|(index, _)| *index >= known) {

@@ -62,7 +62,8 @@ mod tests {
     fn names_in_old_code_pages_stay_different() {
         assert_eq!(name(b" Au\xdfenwand\r"), "Außenwand");
         assert_eq!(name("c\u{f4}t\u{e9}".as_bytes()), "côté");
-        let all: std::collections::HashSet<String> = (0x80..=0xffu8).map(|b| name(&[b, b'x'])).collect();
+        let all: std::collections::HashSet<String> =
+            (0x80..=0xffu8).map(|b| name(&[b, b'x'])).collect();
         // Code page 850 gives five letters that Latin-1 has too; 0xa0 is a blank.
         assert_eq!(all.len(), 128 - 5);
         assert!(all.iter().all(|n| n.ends_with('x')));
