@@ -13,6 +13,7 @@ trimesh, gmsh and VTK where they are installed. Exit code 1 if anything was lost
 import argparse
 import collections
 import contextlib
+import glob
 import gzip
 import io
 import itertools
@@ -45,10 +46,6 @@ class Body:
             parts = [face] if len(face) <= most else [[face[0], face[k], face[k + 1]] for k in range(1, len(face) - 1)]
             cut += [(part, label) for part in parts]
         return cut
-
-    def volume(self):
-        fans = [(f[0], f[k], f[k + 1]) for f, n in zip(self.faces, self.labels) if n >= 0 for k in range(1, len(f) - 1)]
-        return sum(np.linalg.det(self.points[list(t)]) for t in fans) / 6
 
 
 def block(x):
@@ -98,6 +95,13 @@ class File:
         self.lines_at = [(f[0], f[1]) for f, _ in self.faces[:3]] if rng.random() < 0.3 else []
         self.with_solids = bool(self.hexahedra) and rng.random() < 0.3
         self.end = "\n"
+
+    def n_triangles(self):
+        return sum(len(face) - 2 for face, _ in self.faces)
+
+    def bounds(self):
+        used = self.points[[v for face, _ in self.faces for v in face]]
+        return [used.min(0), used.max(0)]
 
     def maybe(self, text, share=0.4):
         return text if self.rng.random() < share else ""
@@ -180,7 +184,7 @@ def off(f, _):
     return head + "\n" + f.note("#") + counts + f.note("#") + "".join(p + more + f.maybe(" # x", 0.1) + "\n" for p in f.xyz()) + f.maybe("\n") + faces
 
 
-def grouped(f, of):
+def grouped(f):
     return [(n, [x for x in f.faces if len(x[0]) == n]) for n in (3, 4) if any(len(x[0]) == n for x in f.faces)]
 
 
@@ -188,7 +192,7 @@ def medit(f, _):
     f.need_labels = {str(i + 1) for i in f.used}
     case, names = f.rng.choice([str, str.lower, str.upper]), {3: "Triangles", 4: "Quadrilaterals"}
     points = case("Vertices") + f"\n{len(f.points)}\n" + "".join(p + " 0\n" + f.maybe("# x\n", 0.1) for p in f.xyz())
-    faces = "".join(case(names[n]) + f"\n{len(rows)}\n" + "".join(f.row(*[v + 1 for v in face], i + 1) for face, i in rows) for n, rows in grouped(f, medit))
+    faces = "".join(case(names[n]) + f"\n{len(rows)}\n" + "".join(f.row(*[v + 1 for v in face], i + 1) for face, i in rows) for n, rows in grouped(f))
     edges = f.need(THIN, f.lines_at)
     more = case("Edges") + f"\n{len(edges)}\n" + "".join(f.row(a + 1, b + 1, 7) for a, b in edges) if edges else ""
     if f.with_solids:
@@ -210,7 +214,7 @@ def meshb(f, _):
 
     out += struct.pack(f"{order}i{place}i", 3, len(out) + 8 + struct.calcsize("=" + place), 3)
     parts = [(4, [struct.pack(f"{order}3{real}{integer}", *p, 0) for p in f.points])]
-    parts += [({3: 6, 4: 7}[n], [struct.pack(f"{order}{n + 1}{integer}", *[v + 1 for v in face], i + 1) for face, i in rows]) for n, rows in grouped(f, meshb)]
+    parts += [({3: 6, 4: 7}[n], [struct.pack(f"{order}{n + 1}{integer}", *[v + 1 for v in face], i + 1) for face, i in rows]) for n, rows in grouped(f)]
     parts += [(5, [struct.pack(f"{order}3{integer}", a + 1, b + 1, 7) for a, b in f.need(THIN, f.lines_at)])] if f.lines_at else []
     for number, rows in parts[::-1] if f.late else parts:
         section(number, rows)
@@ -265,7 +269,7 @@ def inp(f, _):
     nodes = case("*Node\n") + "".join(f"{k + 1}, {p}\n" + f.maybe("** x\n", 0.1) for k, p in enumerate(f.xyz(", ")))
     kinds, elements, count = {3: ["S3", "CPS3", "STRI3", "S3R"], 4: ["S4", "S4R", "CPS4", "M3D4"]}, "", itertools.count(1)
     for i in f.used:
-        for n, rows in grouped(f, inp):
+        for n, rows in grouped(f):
             rows = [face for face, label in rows if label == i]
             if rows:
                 elements += case("*Element, type=") + f"{f.rng.choice(kinds[n])}, {case('elset')}={f.names[i].replace(' ', '_')}\n"
@@ -333,7 +337,7 @@ OWN = [("STL text", "stl", stl, None, 3), ("STL binary", "stl", stl_binary, None
 
 
 def encode(rng, text):
-    """Bytes of a text with some line end, encoding and mark; and whether names survive."""
+    """Bytes of a text with some line end, encoding and mark."""
     if isinstance(text, bytes):
         return text
     text = text if rng.random() < 0.8 else text.rstrip("\n")
@@ -356,8 +360,109 @@ def own(entry, rng, folder, n):
     if packed == ".zst":
         subprocess.run(["zstd", "-q", "-f", "--rm", path], check=True)
         path += packed
-    want = {"triangles": sum(len(face) - 2 for face, _ in f.faces), "labels": f.need_labels or {f"v{n}"}, "bounds": [body.points.min(0), body.points.max(0)]}
+    want = {"triangles": f.n_triangles(), "labels": f.need_labels or {f"v{n}"}, "bounds": f.bounds()}
     return path, want, f.needs
+
+
+def library(name):
+    """A module, or `None` where it is not installed."""
+    with contextlib.suppress(ImportError):
+        return __import__(name)
+
+
+def by_meshio(rng, path):
+    meshio, kind = library("meshio"), os.path.splitext(path)[1]
+    f = File(rng, bodies(rng), 3 if kind in (".stl", ".off") else 4)
+    cells = [({3: "triangle", 4: "quad"}[n], [face for face, _ in rows]) for n, rows in grouped(f)]
+    if f.lines_at and kind in (".mesh", ".msh", ".vtk", ".vtu"):
+        cells.append(("line", f.need(THIN, f.lines_at)))
+    if f.with_solids and kind in (".mesh", ".msh", ".vtk", ".vtu", ".inp", ".nas"):
+        cells.append(("hexahedron", f.need(SOLID, f.hexahedra)))
+    data = {"region": [np.arange(len(c)) for _, c in cells]} if kind in (".vtk", ".vtu") and rng.random() < 0.5 else {}
+    f.need("values at cells", data)
+    options = {".msh": {"file_format": rng.choice(["gmsh22", "gmsh"]), "binary": rng.random() < 0.5}, ".vtk": {"binary": rng.random() < 0.5}, ".ply": {"binary": rng.random() < 0.5},
+               ".vtu": {"binary": rng.random() < 0.5}, ".nas": {"point_format": "fixed-large"}}.get(kind, {})
+    meshio.Mesh(f.points, cells, cell_data=data).write(path, **options)
+    return {"triangles": f.n_triangles(), "bounds": f.bounds()}, f.needs
+
+
+def by_trimesh(rng, path):
+    trimesh, f = library("trimesh"), File(rng, bodies(rng), 3)
+    mesh = trimesh.Trimesh(f.points, [face for face, _ in f.faces], process=False)
+    if rng.random() < 0.5:
+        mesh.visual.vertex_colors = [255, 0, 0, 255]
+    mesh.export(path)
+    return {"triangles": len(f.faces), "bounds": mesh.bounds}, []
+
+
+def by_vtk(rng, path):
+    pyvista, f = library("pyvista"), File(rng, bodies(rng))
+    cells = np.concatenate([[len(face), *face] for face, _ in f.faces])
+    mesh = pyvista.PolyData(f.points, faces=cells, **({"lines": np.array([[2, a, b] for a, b in f.need(THIN, f.lines_at)]).ravel()} if f.lines_at else {}))
+    if path.endswith(".vtu"):
+        mesh = mesh.cast_to_unstructured_grid()
+    if rng.random() < 0.4:
+        mesh.field_data["TIME"] = [0.5]
+    if rng.random() < 0.4:
+        mesh.point_data["h"] = np.arange(mesh.n_points) * 0.1
+    if f.need("values at cells", rng.random() < 0.4):
+        mesh.cell_data["region"] = np.arange(mesh.n_cells)
+    if path.endswith((".ply", ".stl")):  # these hold faces alone
+        f.needs = []
+    mesh.save(path, binary=rng.random() < 0.6)
+    return {"triangles": f.n_triangles(), "bounds": f.bounds()}, f.needs
+
+
+def by_gmsh(rng, path):
+    gmsh = library("gmsh")
+    gmsh.initialize(["gmsh", "-v", "1"])
+    try:
+        occ, mesh, needs = gmsh.model.occ, gmsh.model.mesh, []
+        boxes = [(3, occ.addBox(x, 0, 0, 1, 1, 1)) for x in range(rng.choice([1, 2]))]
+        if len(boxes) > 1:
+            occ.fragment(boxes[:1], boxes[1:])
+        occ.synchronize()
+        faces = [tag for _, tag in gmsh.model.getEntities(2)]
+        with_all, kind = rng.random() < 0.4, os.path.splitext(path)[1]
+        labels = None
+        if not with_all:
+            names = rng.sample(NAMES, 2)
+            gmsh.model.addPhysicalGroup(2, faces[:3], 11, names[0])
+            gmsh.model.addPhysicalGroup(2, faces[3:], 12, names[1])
+            labels = set(names) if kind == ".msh" else None
+        for key, value in {"Mesh.MeshSizeMin": 0.6, "Mesh.SaveAll": with_all, "Mesh.Binary": rng.randrange(2), "Mesh.RecombineAll": rng.randrange(2),
+                           "Mesh.MshFileVersion": rng.choice([1, 2.2, 4.0, 4.1]), "Mesh.BdfFieldFormat": rng.randrange(3)}.items():
+            gmsh.option.setNumber(key, value)
+        if labels and gmsh.option.getNumber("Mesh.MshFileVersion") == 1:
+            labels = {"11", "12"}
+        has_solids = with_all and rng.random() < 0.5 and gmsh.option.getNumber("Mesh.RecombineAll") == 0
+        mesh.generate(3 if has_solids else 2)
+        count = lambda kind: len(mesh.getElementsByType(kind)[0])
+        if with_all and kind in (".msh", ".mesh", ".vtk"):
+            needs += [THIN] + [SOLID] * bool(has_solids)
+        curved = kind in (".msh", ".vtk", ".inp", ".unv") and rng.random() < 0.3
+        if curved:
+            mesh.setOrder(2)
+            needs.append(CURVED)
+        triangles = count(9) + 2 * count(10) + 2 * count(16) if curved else count(2) + 2 * count(3)
+        gmsh.write(path)
+        return {"triangles": triangles, "labels": labels, "bounds": [[0, 0, 0], [len(boxes), 1, 1]]}, needs
+    finally:
+        gmsh.finalize()
+
+
+# Module, writer, endings.
+OTHERS = [("meshio", by_meshio, "stl ply obj off mesh msh vtk vtu inp nas"), ("trimesh", by_trimesh, "stl ply obj off"),
+          ("pyvista", by_vtk, "vtk vtp vtu ply stl"), ("gmsh", by_gmsh, "msh mesh inp bdf unv vtk stl off")]
+
+
+def other_counts(path):
+    """Triangles by meshio or trimesh, or `None`."""
+    with contextlib.suppress(BaseException), contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        cells = library("meshio").read(path).cells
+        return sum(len(c.data) * (c.data.shape[1] - 2 if c.type == "polygon" else {"triangle": 1, "quad": 2}.get(c.type, 0)) for c in cells)
+    with contextlib.suppress(BaseException):
+        return len(library("trimesh").load(path, process=False, force="mesh").faces)
 
 
 def check(tetdb, path):
@@ -415,6 +520,19 @@ def main():
             for n in range(options.n):
                 rng = random.Random(f"{options.seed} {entry[0]} {n}")
                 judge(entry[0], *own(entry, rng, folder, n))
+        for module, writer, endings in OTHERS:
+            for ending in endings.split() if library(module) else []:
+                for n in range(options.n):
+                    rng, path = random.Random(f"{options.seed} {module} {ending} {n}"), os.path.join(folder, f"v{n}.{ending}")
+                    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+                        want, needs = writer(rng, path)
+                    judge(f".{ending} of {module}", path, want, needs)
+            if not library(module):
+                print(f"skipped: {module} is not installed")
+    for path in sorted(glob.glob(os.path.join(options.collection, "**", "*.*"), recursive=True)) if options.collection else []:
+        count = other_counts(path)
+        if count:
+            judge("collection", path, {"triangles": count}, [])
     columns = ["variants", "equal", "noted", "refused", "SILENT"]
     print(f"{'format':24}" + "".join(f"{c:>10}" for c in columns))
     for name, row in table.items():

@@ -123,7 +123,7 @@ impl<'a, 'b> Elements<'a, 'b> {
             "R2D", "RB",
         ]) {
             self.n_thin += 1;
-        } else if is(&["S", "DS", "R3D", "M3D", "CPS", "CPE", "F3D"]) {
+        } else if is(&["S", "DS", "R3D", "M3D", "CPS", "CPE", "CAX", "F3D"]) {
             let corners = match n {
                 3 | 6 | 7 => 3,
                 4 | 8 | 9 => 4,
