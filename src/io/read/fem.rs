@@ -218,7 +218,8 @@ pub(super) fn read_abaqus<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSin
                 }
                 "*INSTANCE" => n_instances += 1,
                 "*ELSET" => n_sets += 1,
-                "*INCLUDE" | "*SYSTEM" | "*NGEN" | "*NFILL" | "*ELGEN" | "*NCOPY" | "*ELCOPY" => {
+                "*INCLUDE" | "*SYSTEM" | "*NGEN" | "*NFILL" | "*ELGEN" | "*NCOPY" | "*NMAP"
+                | "*ELCOPY" => {
                     return Err(unsupported(&place, format!("the keyword {keyword}")));
                 }
                 "*NODE" if option("SYSTEM").is_some_and(|s| !s.eq_ignore_ascii_case("R")) => {

@@ -3,6 +3,7 @@
 //! A face names vertices from 1, or backwards from the last one as −1. Texture and normal numbers after slashes are skipped. A backslash
 //! continues a line, `#` begins a comment; names of groups may have one.
 
+use std::collections::HashMap;
 use std::io::BufRead;
 
 use super::embedded_sink::{EmbeddedSink, WireKind};
@@ -41,6 +42,24 @@ impl Names {
     }
 }
 
+/// Labels whose faces differ in a name that is none.
+#[derive(Default)]
+struct Merged {
+    /// Label -> object and material of its first face.
+    known: HashMap<String, (String, String)>,
+    first: Option<String>,
+}
+
+impl Merged {
+    fn check(&mut self, names: &Names) {
+        let new = (names.object.clone(), names.material.clone());
+        let known = self.known.entry(names.best().to_owned()).or_insert_with(|| new.clone());
+        if *known != new {
+            self.first.get_or_insert_with(|| names.best().to_owned());
+        }
+    }
+}
+
 /// Words of lines that neither add nor name faces, the empty one among them.
 const IGNORED: [&[u8]; 16] = [
     b"",
@@ -68,6 +87,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     let mut corners = Vec::new();
     // Vertex numbers beyond those known when they were named, each larger than the one before.
     let mut ahead: Vec<(u32, FilePlace)> = Vec::new();
+    let mut merged = Merged::default();
     let (mut n_lines_points, mut n_unknown, mut unknown) = (0, 0, None);
     loop {
         let place = feed.place();
@@ -94,7 +114,10 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                 if corners.len() < 3 {
                     return Err(unexpected(&place, "a face of at least 3 corners", &line));
                 }
-                let label = *label.get_or_insert_with(|| target.label(names.best()));
+                let label = *label.get_or_insert_with(|| {
+                    merged.check(&names);
+                    target.label(names.best())
+                });
                 let added = target.builder.polygon(&corners, label);
                 added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
             }
@@ -110,6 +133,12 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                 n_unknown += 1;
             }
         }
+    }
+    if let Some(name) = merged.first {
+        let name = quote(name.as_bytes());
+        let what =
+            format!("faces of the label {name} differ in object or material, which were left out");
+        target.builder.note(NoteKind::Said(what));
     }
     if let Some((word, Spot::Line(line))) = unknown {
         let left_out = "lines of no known kind were left out, the first one";

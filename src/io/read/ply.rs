@@ -102,6 +102,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
             }
         }
     }
+    reader.feed.note_rest(target.builder)?;
     reader.feed.finish(target.builder)
 }
 

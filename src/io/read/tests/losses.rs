@@ -59,6 +59,35 @@ fn elements_beside_faces_are_noted() {
 }
 
 #[test]
+fn what_follows_the_declared_content_is_noted() {
+    let off = "OFF\n4 4 0\n".to_owned() + &off_body();
+    noted(Format::Off, format!("{off}# end\n\n"), &[]);
+    noted(Format::Off, format!("{off}3 0 1 2\n"), &["8 bytes behind"]);
+    for format in ["ascii", "binary_little_endian"] {
+        noted(Format::Ply, ply(format), &[]);
+        noted(Format::Ply, [&ply(format)[..], b"3 0 1 2"].concat(), &["7 bytes behind"]);
+    }
+    let smesh =
+        "4 3\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n4 0\n3 1 2 3\n3 0 3 2\n3 0 1 3\n3 0 2 1\n0\n0\n";
+    noted(Format::TetgenSmesh, smesh, &[]);
+    noted(Format::TetgenSmesh, smesh.to_owned() + "3 0 1 2\n", &["behind"]);
+}
+
+#[test]
+fn materials_inside_an_object_are_noted() {
+    let obj = indexed(|v| (v + 1).to_string(), "v ", "f ", "");
+    let cut = obj.find("f ").unwrap();
+    let last = obj.rfind("f ").unwrap();
+    let named =
+        |a: &str, b: &str| format!("{}{a}{}{b}{}", &obj[..cut], &obj[cut..last], &obj[last..]);
+    let surface = noted(Format::Obj, named("o body\nusemtl a\n", "usemtl b\n"), &["label `body`"]);
+    assert_eq!(surface.label_names, ["body"]);
+    noted(Format::Obj, named("usemtl a\n", "usemtl b\n"), &[]);
+    noted(Format::Obj, named("g a\nusemtl m\n", "g b\nusemtl n\n"), &[]);
+    noted(Format::Obj, named("o a\ng x\n", "o b\ng x\n"), &["label `x`"]);
+}
+
+#[test]
 fn curved_faces_of_medit_are_refused_and_curved_cells_noted() {
     for (keyword, n) in [("TrianglesP3", 10), ("QuadrilateralsQ2", 9), ("QuadrilateralsQ4", 25)] {
         let curved = format!("{keyword}\n1\n{}0\nEnd", "1 ".repeat(n));
