@@ -496,7 +496,7 @@ def main():
     options = words.parse_args()
     table, shown = {}, collections.Counter()
 
-    def judge(name, path, want, needs):
+    def compare(name, path, want, needs):
         row = table.setdefault(name, collections.Counter())
         found, said, code = check(options.tetdb, path)
         if found is None:
@@ -521,20 +521,20 @@ def main():
         for entry in OWN:
             for n in range(options.n):
                 rng = random.Random(f"{options.seed} {entry[0]} {n}")
-                judge(entry[0], *own(entry, rng, folder, n))
+                compare(entry[0], *own(entry, rng, folder, n))
         for module, writer, endings in OTHERS:
             for ending in endings.split() if library(module) else []:
                 for n in range(options.n):
                     rng, path = random.Random(f"{options.seed} {module} {ending} {n}"), os.path.join(folder, f"v{n}.{ending}")
                     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
                         want, needs = writer(rng, path)
-                    judge(f".{ending} of {module}", path, want, needs)
+                    compare(f".{ending} of {module}", path, want, needs)
             if not library(module):
                 print(f"skipped: {module} is not installed")
     for path in sorted(glob.glob(os.path.join(options.collection, "**", "*.*"), recursive=True)) if options.collection else []:
         count = other_counts(path)
         if count:
-            judge("collection", path, {"triangles": count}, [])
+            compare("collection", path, {"triangles": count}, [])
     columns = ["variants", "equal", "noted", "refused", "SILENT"]
     print(f"{'format':24}" + "".join(f"{c:>10}" for c in columns))
     for name, row in table.items():
