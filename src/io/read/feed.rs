@@ -4,9 +4,9 @@ use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
 
 use super::error::{FilePlace, ReadError, ReadFault, Spot};
 use super::words::COORDINATE_MAX;
-pub(super) use super::words::{check_point, name, not_a_number, parse, quote};
+pub(super) use super::words::{check_point, name, not_a_number, parse, quote, text};
 use tetdb_base::geom::Point;
-use tetdb_base::surface::{SurfaceBuilder, SurfaceError};
+use tetdb_base::surface::{NoteKind, SurfaceBuilder, SurfaceError};
 
 /// Longest word accepted in text: numbers and keywords are far shorter.
 const WORD_MAX: usize = 4096;
@@ -404,6 +404,16 @@ impl<R: BufRead> Feed<R> {
     /// The error of a file without triangles.
     pub fn empty(&self) -> ReadError {
         FilePlace { file: self.at.file.clone(), spot: Spot::File }.refuse(ReadFault::Empty)
+    }
+
+    /// Notes what stands behind the declared content.
+    pub fn note_rest(&mut self, builder: &mut SurfaceBuilder) -> Result<()> {
+        let is_over = !self.at.is_binary && self.at_end()?;
+        let n = self.len.saturating_sub(self.at.offset);
+        if !is_over && n > 0 {
+            builder.note(NoteKind::TrailingBytes { n });
+        }
+        Ok(())
     }
 
     /// Ends the file of `builder`, which must have triangles of it.

@@ -3,7 +3,7 @@
 //! Each reads shells, membranes and flat elements as faces; curved ones by their corners. Solid elements name regions, beams are left
 //! out with a note. What would move nodes, such as other coordinate systems, is refused.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::io::BufRead;
 
 use super::feed::{Feed, Result, name, parse, quote};
@@ -17,6 +17,8 @@ use tetdb_base::surface::NoteKind;
 struct Elements<'a, 'b> {
     target: &'a mut SurfaceSink<'b>,
     nodes: NodeTags,
+    /// Solid elements to come: nodes, name, place.
+    late_solids: Vec<(Vec<i64>, String, FilePlace)>,
     /// Vertices of the file before the nodes of this part.
     first: u32,
     solids: Solids,
@@ -40,6 +42,7 @@ impl<'a, 'b> Elements<'a, 'b> {
         Self {
             target,
             nodes: NodeTags::default(),
+            late_solids: Vec::new(),
             first: 0,
             solids: Solids::default(),
             n_thin: 0,
@@ -72,13 +75,16 @@ impl<'a, 'b> Elements<'a, 'b> {
         self.faces.push((id, tags.to_vec(), label, place.clone()));
     }
 
-    /// Adds the faces kept so far; `label_of` may replace the label of an element.
+    /// Adds the faces and solid elements kept so far; `label_of` may replace the label of an element.
     fn take_faces(&mut self, label_of: impl Fn(i64) -> Option<String>) -> Result<()> {
         for (id, tags, label, place) in std::mem::take(&mut self.faces) {
             let corners = self.corners(&tags, &place)?;
             let label = self.target.label(&label_of(id).unwrap_or(label));
             let added = self.target.builder.polygon(&corners, label);
             added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
+        }
+        for (tags, name, place) in std::mem::take(&mut self.late_solids) {
+            self.solid(&tags, &name, &place)?;
         }
         Ok(())
     }
@@ -102,7 +108,8 @@ impl<'a, 'b> Elements<'a, 'b> {
         let (id, tags) = tags.split_first().ok_or_else(|| unexpected(place, "an element", text))?;
         let is = |prefixes: &[&str]| prefixes.iter().any(|p| kind.starts_with(p));
         let n = tags.len();
-        if is(&["C3D", "DC3D", "AC3D"]) {
+        // Continuum shells are solid elements.
+        if is(&["C3D", "DC3D", "AC3D", "SC6R", "SC8R"]) {
             let corners = match n {
                 4 | 10 => 4,
                 5 | 13 => 5,
@@ -110,13 +117,13 @@ impl<'a, 'b> Elements<'a, 'b> {
                 8 | 20 | 27 => 8,
                 _ => return Err(unexpected(place, "a solid element of that type", kind)),
             };
-            self.solid(&tags[..corners], set, place)?;
+            self.late_solids.push((tags[..corners].to_vec(), set.to_owned(), place.clone()));
         } else if is(&[
             "T2D", "T3D", "B2", "B3", "PIPE", "CONN", "SPRING", "MASS", "ROTARY", "DASH", "GAP",
             "R2D", "RB",
         ]) {
             self.n_thin += 1;
-        } else if is(&["S", "DS", "R3D", "M3D", "CPS", "CPE", "F3D"]) {
+        } else if is(&["S", "DS", "R3D", "M3D", "CPS", "CPE", "CAX", "F3D"]) {
             let corners = match n {
                 3 | 6 | 7 => 3,
                 4 | 8 | 9 => 4,
@@ -168,8 +175,8 @@ fn line<R: BufRead>(feed: &mut Feed<R>, comment: &str) -> Result<Option<(String,
         if !feed.read_line(&mut bytes)? {
             return Ok(None);
         }
-        let text = String::from_utf8_lossy(&bytes).trim_end().to_owned();
-        if !text.trim().is_empty() && !text.starts_with(comment) {
+        let text = super::feed::text(&bytes).trim_end().to_owned();
+        if !text.trim().is_empty() && !text.trim_start().starts_with(comment) {
             return Ok(Some((text, place)));
         }
     }
@@ -181,8 +188,14 @@ pub(super) fn read_abaqus<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSin
     let (mut keyword, mut kind, mut set) = (String::new(), String::new(), String::new());
     let (mut n_parts, mut n_instances, mut n_sets) = (0, 0, 0);
     while let Some((mut text, place)) = line(&mut feed, "**")? {
-        if text.starts_with('*') {
-            let mut words = text.split(',').map(str::trim);
+        if text.trim_start().starts_with('*') {
+            while text.ends_with(',') {
+                let Some((more, _)) = line(&mut feed, "**")? else {
+                    return Err(feed.truncated("the rest of the keyword"));
+                };
+                text += &more;
+            }
+            let mut words = text.trim_start().split(',').map(str::trim);
             keyword = words.next().unwrap_or_default().to_ascii_uppercase();
             let options: Vec<(String, &str)> = words
                 .filter_map(|w| w.split_once('='))
@@ -190,6 +203,9 @@ pub(super) fn read_abaqus<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSin
                 .collect();
             let option = |key: &str| options.iter().find(|o| o.0 == key).map(|o| o.1.to_owned());
             match keyword.as_str() {
+                "*NODE" | "*ELEMENT" if option("INPUT").is_some() => {
+                    return Err(unsupported(&place, "data in a file of its own (INPUT)"));
+                }
                 "*ELEMENT" => {
                     kind = option("TYPE").unwrap_or_default().to_ascii_uppercase();
                     set = option("ELSET").unwrap_or_default();
@@ -202,7 +218,8 @@ pub(super) fn read_abaqus<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSin
                 }
                 "*INSTANCE" => n_instances += 1,
                 "*ELSET" => n_sets += 1,
-                "*INCLUDE" | "*SYSTEM" | "*NGEN" | "*NFILL" | "*ELGEN" | "*NCOPY" | "*ELCOPY" => {
+                "*INCLUDE" | "*SYSTEM" | "*NGEN" | "*NFILL" | "*ELGEN" | "*NCOPY" | "*NMAP"
+                | "*ELCOPY" => {
                     return Err(unsupported(&place, format!("the keyword {keyword}")));
                 }
                 "*NODE" if option("SYSTEM").is_some_and(|s| !s.eq_ignore_ascii_case("R")) => {
@@ -251,8 +268,14 @@ fn fields(text: &str) -> Vec<String> {
     if text.contains(',') {
         return text.split(',').take(9).map(|f| f.trim().to_owned()).collect();
     }
-    let text = text.replace('\t', "        ");
-    let bytes = text.as_bytes();
+    // A tab ends a field: it leads to the next column that is a multiple of 8.
+    let mut bytes = Vec::new();
+    for b in text.bytes() {
+        match b {
+            b'\t' => bytes.resize((bytes.len() + 1).next_multiple_of(8), b' '),
+            _ => bytes.push(b),
+        }
+    }
     let cut = |from: usize, to: usize| {
         let part = bytes.get(from.min(bytes.len())..to.min(bytes.len())).unwrap_or_default();
         String::from_utf8_lossy(part).trim().to_owned()
@@ -263,13 +286,35 @@ fn fields(text: &str) -> Vec<String> {
     std::iter::once(first).chain(rest).collect()
 }
 
+/// The next line of Nastran. Errors: a tab behind a field that is full, which some programs pass over and others do not.
+fn nastran_line<R: BufRead>(feed: &mut Feed<R>) -> Result<Option<Row>> {
+    let next = line(feed, "$")?;
+    if let Some((text, place)) = next.as_ref().filter(|(text, _)| !text.contains(',')) {
+        let mut column = 0usize;
+        let mut before = b'\t';
+        for b in text.bytes() {
+            if b == b'\t' && before != b'\t' && column.is_multiple_of(8) {
+                return Err(unsupported(place, "a tab behind a field of 8 characters"));
+            }
+            column = if b == b'\t' { (column + 1).next_multiple_of(8) } else { column + 1 };
+            before = b;
+        }
+    }
+    Ok(next)
+}
+
+/// Returns whether a line continues a card: its first field is empty or a mark.
+fn continues(text: &str) -> bool {
+    let first = fields(text).swap_remove(0);
+    first.is_empty() || first.starts_with(['+', '*'])
+}
+
 /// Reads bulk data of Nastran: `GRID` and shells, in every field format; the property of an element is its label.
 pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut mesh = Elements::new(target);
-    let mut solids = Vec::new();
-    let mut next = line(&mut feed, "$")?;
+    let mut next = nastran_line(&mut feed)?;
     while let Some((text, place)) = next {
-        next = line(&mut feed, "$")?;
+        next = nastran_line(&mut feed)?;
         let mut card = fields(&text);
         let kind = card[0].trim_end_matches('*').to_ascii_uppercase();
         if kind == "ENDDATA" {
@@ -279,13 +324,13 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
             return Err(unsupported(&place, "INCLUDE"));
         }
         while let Some((more, _)) = &next
-            && (more.starts_with(['+', '*', ' ', ',', '\t']))
+            && continues(more)
         {
             // A line has 8 fields of 8 characters, or 4 of 16.
             let n_fields = if card[0].ends_with('*') { 4 } else { 8 };
             card.resize((card.len() - 1).next_multiple_of(n_fields) + 1, String::new());
             card.extend(fields(more).into_iter().skip(1));
-            next = line(&mut feed, "$")?;
+            next = nastran_line(&mut feed)?;
         }
         card[0] = kind;
         let field = |k: usize| card.get(k).map_or("", String::as_str);
@@ -299,8 +344,11 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
                 mesh.node(integer(field(1), &place)?, [x(3)?, x(4)?, x(5)?], &place)?;
                 0
             }
+            "GRDSET" if !["", "0"].contains(&field(2)) => {
+                return Err(unsupported(&place, "nodes in a coordinate system of their own"));
+            }
             "CTRIA3" | "CTRIAR" | "CTRIA6" => 3,
-            "CQUAD4" | "CQUADR" | "CQUAD8" => 4,
+            "CQUAD4" | "CQUADR" | "CQUAD8" | "CSHEAR" => 4,
             kind if kind.starts_with("CTRI") || kind.starts_with("CQUAD") => {
                 return Err(unsupported(&place, format!("the element {kind}")));
             }
@@ -308,7 +356,9 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
             "CPENTA" => -6,
             "CPYRAM" => -5,
             "CHEXA" => -8,
-            "CBAR" | "CBEAM" | "CROD" | "CONM2" | "CELAS2" | "CBUSH" | "CONROD" => {
+            "CBAR" | "CBEAM" | "CBEND" | "CROD" | "CONROD" | "CTUBE" | "CBUSH" | "CBUSH1D"
+            | "CELAS1" | "CELAS2" | "CGAP" | "CMASS1" | "CMASS2" | "CONM1" | "CONM2" | "CDAMP1"
+            | "CDAMP2" | "CVISC" | "CWELD" | "CFAST" | "PLOTEL" => {
                 mesh.n_thin += 1;
                 0
             }
@@ -323,13 +373,10 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
                 if ["CTRIA6", "CQUAD8"].contains(&card[0].as_str()) { 8 } else { tags.len() };
             mesh.face(id, &tags, n_nodes, property, &place);
         } else if n_corners < 0 {
-            solids.push((tags, format!("property_{property}"), place));
+            mesh.late_solids.push((tags, format!("property_{property}"), place));
         }
     }
     mesh.take_faces(|_| None)?;
-    for (tags, name, place) in solids {
-        mesh.solid(&tags, &name, &place)?;
-    }
     mesh.finish(&feed)
 }
 
@@ -337,6 +384,7 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
 pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut mesh = Elements::new(target);
     let mut groups: HashMap<i64, String> = HashMap::new();
+    let mut other_groups = BTreeSet::new();
     let mut solids = Vec::new();
     while let Some((mark, place)) = line(&mut feed, "\0")? {
         if mark.trim() != "-1" {
@@ -371,19 +419,31 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
             "2412" => {
                 unv_elements(&mut mesh, rows, &mut solids)?;
             }
-            "2467" | "2477" | "2452" | "2435" | "2432" | "2430" => {
+            "2467" | "2477" | "2452" | "2435" | "2432" | "2430" | "2429" => {
+                // Kind and number of an entity; later versions have two more words.
+                let each = if ["2432", "2430", "2429"].contains(&kind.trim()) { 2 } else { 4 };
                 while let (Some((head, place)), Some((title, _))) = (rows.next(), rows.next()) {
                     let n = numbers(&head, &place)?.last().copied().unwrap_or(0);
                     let mut words = Vec::new();
-                    while (words.len() as i64) < 4 * n {
-                        let Some((row, place)) = rows.next() else { break };
+                    while (words.len() as i64) < n.saturating_mul(each) {
+                        let Some((row, place)) = rows.next() else {
+                            let expected = format!("{n} entities of the group");
+                            return Err(unexpected(&place, &expected, "the end of the data set"));
+                        };
                         words.extend(numbers(&row, &place)?);
                     }
+                    let title = name(title.as_bytes());
                     // Kind 8 is an element.
-                    for entry in words.chunks_exact(4).filter(|entry| entry[0] == 8) {
-                        groups.entry(entry[1]).or_insert_with(|| name(title.as_bytes()));
+                    for entry in words.chunks_exact(each as usize).filter(|entry| entry[0] == 8) {
+                        let first = groups.entry(entry[1]).or_insert_with(|| title.clone());
+                        if *first != title {
+                            other_groups.insert(title.clone());
+                        }
                     }
                 }
+            }
+            kind @ ("15" | "71" | "780" | "2417") => {
+                return Err(unsupported(&place, format!("the old data set {kind}")));
             }
             "2420" => {
                 // Coordinate systems: only one whose matrix is that of the global axes leaves nodes in place.
@@ -405,6 +465,10 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
         }
     }
     mesh.take_faces(|id| groups.get(&id).cloned())?;
+    if !other_groups.is_empty() {
+        let names = Vec::from_iter(other_groups).join(", ");
+        mesh.target.builder.note(NoteKind::OtherGroups { names });
+    }
     for (id, tags, place) in solids {
         mesh.solid(&tags, groups.get(&id).map_or("", String::as_str), &place)?;
     }
@@ -421,14 +485,18 @@ type Row = (String, FilePlace);
 /// The elements of data set 2412; solid ones go to `solids`.
 fn unv_elements(
     mesh: &mut Elements,
-    mut rows: impl Iterator<Item = Row>,
+    rows: impl Iterator<Item = Row>,
     solids: &mut Vec<(i64, Vec<i64>, FilePlace)>,
 ) -> Result<()> {
+    let mut rows = rows.peekable();
     while let Some((head, place)) = rows.next() {
         let [id, kind, .., n] = numbers(&head, &place)?[..] else {
             return Err(unexpected(&place, "the head of an element", head));
         };
-        if matches!(kind, 21..=24) {
+        // Beams have a line of three numbers for their orientation, rods in some files.
+        let is_rod = kind == 11 && n == 2;
+        let has_three = |(row, _): &Row| row.split_whitespace().count() == 3;
+        if matches!(kind, 21..=24) || is_rod && rows.peek().is_some_and(has_three) {
             rows.next();
         }
         let mut tags = Vec::new();

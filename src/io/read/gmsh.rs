@@ -35,6 +35,7 @@ pub(super) struct GmshReader<'a, 'b, R> {
     pub(super) node_data: Option<HashMap<i64, f64>>,
     pub(super) solids: Solids,
     pub(super) n_curved: u64,
+    pub(super) n_thin: u64,
     /// Names and groups of volumes, as of surfaces.
     pub(super) volume_names: HashMap<i64, String>,
     pub(super) volume_groups: HashMap<i64, i64>,
@@ -72,6 +73,7 @@ impl<'a, 'b, R: BufRead> GmshReader<'a, 'b, R> {
             node_data: None,
             solids: Solids::default(),
             n_curved: 0,
+            n_thin: 0,
             volume_names: HashMap::new(),
             volume_groups: HashMap::new(),
         })
@@ -90,6 +92,10 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Resul
     }
     mesh.target.leave_out_cells(mesh.solids.len());
     std::mem::take(&mut mesh.solids).finish("solid elements", mesh.target);
+    if mesh.n_thin > 0 {
+        let what = "lines and points";
+        mesh.target.builder.note(NoteKind::SkippedElements { what, n: mesh.n_thin });
+    }
     mesh.target.end_cells(&mesh.numbers.feed)?;
     mesh.numbers.feed.finish(mesh.target.builder)
 }
@@ -272,6 +278,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     /// Takes the nodes of an element as a face or a solid; the first ones are its corners.
     pub(super) fn element(&mut self, kind: ElementType, tags: &[i64; 8], group: i64) -> Result<()> {
         let ElementType { n_nodes, n_corners, role } = kind;
+        self.n_thin += u64::from(role == Role::Thin);
         if role == Role::Thin || role == Role::Face && self.target.leaves_out_face() {
             return Ok(());
         }

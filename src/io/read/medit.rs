@@ -40,8 +40,13 @@ pub(super) fn read<R: BufRead>(
                     _ => read_faces::<4, _>(numbers, "quadrilaterals", n, target)?,
                 }
             }
-            "trianglesp2" | "quadrilateralsq2" => {
-                return Err(numbers.feed.unsupported("curved triangles"));
+            "trianglesp2" | "trianglesp3" | "trianglesp4" | "quadrilateralsq2"
+            | "quadrilateralsq3" | "quadrilateralsq4" => {
+                return Err(numbers.feed.unsupported("curved triangles or quadrilaterals"));
+            }
+            "edges" | "edgesp2" | "edgesp3" | "edgesp4" => {
+                note_skipped("edges", numbers.skipped_count()?, target);
+                return Ok(SectionRead::Part);
             }
             _ => {
                 if target.cells.are_wanted() && cells_of(numbers, keyword, n_vertices, target)? {
@@ -71,10 +76,10 @@ pub(super) fn read<R: BufRead>(
 /// Name of the solid elements of a section that is skipped.
 fn solid(keyword: &str) -> Option<&'static str> {
     Some(match keyword {
-        "hexahedra" => "hexahedra",
-        "prisms" => "prisms",
-        "pyramids" => "pyramids",
-        "tetrahedrap2" => "tetrahedra",
+        "hexahedra" | "hexahedraq2" | "hexahedraq3" | "hexahedraq4" => "hexahedra",
+        "prisms" | "prismsp2" | "prismsp3" | "prismsp4" => "prisms",
+        "pyramids" | "pyramidsp2" | "pyramidsp3" | "pyramidsp4" => "pyramids",
+        "tetrahedrap2" | "tetrahedrap3" | "tetrahedrap4" => "tetrahedra",
         _ => return None,
     })
 }
@@ -136,8 +141,8 @@ fn cells_of<R: BufRead>(
         "hexahedra" => read_cells::<8, _>(numbers, n_vertices, target)?,
         "prisms" => read_cells::<6, _>(numbers, n_vertices, target)?,
         "pyramids" => read_cells::<5, _>(numbers, n_vertices, target)?,
-        "tetrahedrap2" => {
-            return Err(numbers.feed.unsupported("the boundary of curved tetrahedra"));
+        _ if solid(keyword).is_some() => {
+            return Err(numbers.feed.unsupported("the boundary of curved cells"));
         }
         _ => return Ok(false),
     }

@@ -18,17 +18,38 @@ use super::{ReadFault, Result};
 use tetdb_base::geom::Point;
 
 /// Keywords by their numbers in binary files, in small letters.
-const KEYWORDS: [(i64, &str); 10] = [
+const KEYWORDS: [(i64, &str); 31] = [
     (3, "dimension"),
     (4, "vertices"),
+    (5, "edges"),
     (6, "triangles"),
     (7, "quadrilaterals"),
     (8, "tetrahedra"),
     (9, "prisms"),
     (10, "hexahedra"),
     (24, "trianglesp2"),
+    (25, "edgesp2"),
+    (27, "quadrilateralsq2"),
+    (30, "tetrahedrap2"),
+    (33, "hexahedraq2"),
     (49, "pyramids"),
     (62, "solatvertices"),
+    (86, "prismsp2"),
+    (87, "pyramidsp2"),
+    (88, "quadrilateralsq3"),
+    (89, "quadrilateralsq4"),
+    (90, "trianglesp3"),
+    (91, "trianglesp4"),
+    (92, "edgesp3"),
+    (93, "edgesp4"),
+    (96, "tetrahedrap3"),
+    (97, "tetrahedrap4"),
+    (98, "hexahedraq3"),
+    (99, "hexahedraq4"),
+    (100, "pyramidsp3"),
+    (101, "pyramidsp4"),
+    (102, "prismsp3"),
+    (103, "prismsp4"),
 ];
 /// Number of the last keyword.
 const END: i64 = 54;
@@ -234,7 +255,7 @@ impl<R: BufRead> MeditNumbers<R> {
     /// The number of elements in a section that is skipped; 0 where a text has none.
     pub fn skipped_count(&mut self) -> Result<u64> {
         if let Encoding::Binary { .. } = self.encoding {
-            return self.count("solid elements", 0, 5);
+            return self.count("elements", 0, 3);
         }
         let has_none = !self.feed.at_end()?
             && self.feed.peek()?.is_some_and(|byte| byte.is_ascii_alphabetic());

@@ -3,11 +3,12 @@
 //! A face names vertices from 1, or backwards from the last one as −1. Texture and normal numbers after slashes are skipped. A backslash
 //! continues a line, `#` begins a comment; names of groups may have one.
 
+use std::collections::HashMap;
 use std::io::BufRead;
 
 use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::feed::{Feed, not_a_number, parse, quote};
-use super::{FilePlace, ReadError, ReadFault, Result, SurfaceSink};
+use super::{FilePlace, ReadError, ReadFault, Result, Spot, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
 
@@ -41,6 +42,44 @@ impl Names {
     }
 }
 
+/// Labels whose faces differ in a name that is none.
+#[derive(Default)]
+struct Merged {
+    /// Label -> object and material of its first face.
+    known: HashMap<String, (String, String)>,
+    first: Option<String>,
+}
+
+impl Merged {
+    fn check(&mut self, names: &Names) {
+        let new = (names.object.clone(), names.material.clone());
+        let known = self.known.entry(names.best().to_owned()).or_insert_with(|| new.clone());
+        if *known != new {
+            self.first.get_or_insert_with(|| names.best().to_owned());
+        }
+    }
+}
+
+/// Words of lines that neither add nor name faces, the empty one among them.
+const IGNORED: [&[u8]; 16] = [
+    b"",
+    b"vn",
+    b"vt",
+    b"vp",
+    b"s",
+    b"mg",
+    b"mtllib",
+    b"usemap",
+    b"maplib",
+    b"lod",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"shadow_obj",
+    b"trace_obj",
+    b"end",
+];
+
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut names = Names::default();
     let mut label = None;
@@ -48,7 +87,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     let mut corners = Vec::new();
     // Vertex numbers beyond those known when they were named, each larger than the one before.
     let mut ahead: Vec<(u32, FilePlace)> = Vec::new();
-    let mut n_lines_points = 0;
+    let mut merged = Merged::default();
+    let (mut n_lines_points, mut n_unknown, mut unknown) = (0, 0, None);
     loop {
         let place = feed.place();
         line.clear();
@@ -74,7 +114,10 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                 if corners.len() < 3 {
                     return Err(unexpected(&place, "a face of at least 3 corners", &line));
                 }
-                let label = *label.get_or_insert_with(|| target.label(names.best()));
+                let label = *label.get_or_insert_with(|| {
+                    merged.check(&names);
+                    target.label(names.best())
+                });
                 let added = target.builder.polygon(&corners, label);
                 added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
             }
@@ -84,8 +127,23 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                 let what = "a free-form curve or surface".to_owned();
                 return Err(place.refuse(ReadFault::Unsupported(what)));
             }
-            _ => {}
+            word if IGNORED.contains(&word) => {}
+            word => {
+                unknown.get_or_insert_with(|| (quote(word), place.spot));
+                n_unknown += 1;
+            }
         }
+    }
+    if let Some(name) = merged.first {
+        let name = quote(name.as_bytes());
+        let what =
+            format!("faces of the label {name} differ in object or material, which were left out");
+        target.builder.note(NoteKind::Said(what));
+    }
+    if let Some((word, Spot::Line(line))) = unknown {
+        let left_out = "lines of no known kind were left out, the first one";
+        let what = format!("{n_unknown} {left_out} {word} in line {line}");
+        target.builder.note(NoteKind::Said(what));
     }
     let known = target.builder.n_file_vertices() as u32;
     if let Some((index, place)) = ahead.into_iter().find(|(index, _)| *index >= known) {

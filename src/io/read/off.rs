@@ -56,5 +56,6 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         feed.placed(target.builder.polygon(&corners, label))?;
         feed.skip_line()?;
     }
+    feed.note_rest(target.builder)?;
     feed.finish(target.builder)
 }

@@ -2,9 +2,10 @@
 
 use std::io::BufRead;
 
-use super::feed::{Feed, parse};
+use super::feed::{Feed, parse, quote};
 use super::{Result, Spot, SurfaceSink};
 use tetdb_base::geom::Point;
+use tetdb_base::surface::NoteKind;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Encoding {
@@ -97,10 +98,22 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                         reader.skip(property)?;
                     }
                 }
+                note_skipped(&element.name, n, target);
             }
         }
     }
+    reader.feed.note_rest(target.builder)?;
     reader.feed.finish(target.builder)
+}
+
+/// Notes elements that are neither vertices nor faces.
+fn note_skipped(element: &str, n: u64, target: &mut SurfaceSink) {
+    let what = format!("{n} records of the element {} were left out", quote(element.as_bytes()));
+    match (n, element) {
+        (0, _) => {}
+        (_, "edge") => target.builder.note(NoteKind::SkippedElements { what: "edges", n }),
+        _ => target.builder.note(NoteKind::Said(what)),
+    }
 }
 
 /// Compares an element's count with the bytes left: each property takes its size, or two in text.

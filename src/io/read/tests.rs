@@ -3,6 +3,7 @@
 mod fem;
 mod gmsh;
 mod indexed;
+mod losses;
 mod medit;
 mod ply;
 mod stl;

@@ -74,6 +74,7 @@ pub(super) fn read<R: BufRead>(
     for points in [VolumePoints::Holes, VolumePoints::Regions] {
         read_volume_points(&mut feed, points, target)?;
     }
+    feed.note_rest(target.builder)?;
     feed.finish(target.builder)
 }
 

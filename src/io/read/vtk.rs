@@ -21,10 +21,14 @@ type Cells = Vec<Vec<u32>>;
 /// Bytes of a cell beside its vertices.
 const CELL_BYTES: u64 = 56;
 
+/// Note of a file with values at cells, which may be numbers of regions or materials.
+pub(super) const CELL_VALUES: &str = "the values at cells were left out; they give no labels";
+
 struct Vtk<R> {
     feed: Feed<R>,
     is_binary: bool,
     n_points: u64,
+    has_cell_data: bool,
 }
 
 /// What points are read into.
@@ -145,7 +149,7 @@ pub(super) fn read<R: BufRead>(
     kind: WireKind,
     sink: &mut EmbeddedSink,
 ) -> Result<()> {
-    let mut vtk = Vtk { feed, is_binary: false, n_points: 0 };
+    let mut vtk = Vtk { feed, is_binary: false, n_points: 0, has_cell_data: false };
     let label = sink.label("");
     for (cell, kind_of_cell) in vtk.read_cells(sink)? {
         vtk.feed.placed(match (kind, kind_of_cell) {
@@ -161,7 +165,7 @@ pub(super) fn read<R: BufRead>(
 
 /// Reads polygons, strips and flat cells.
 pub(super) fn read_surface<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
-    let mut vtk = Vtk { feed, is_binary: false, n_points: 0 };
+    let mut vtk = Vtk { feed, is_binary: false, n_points: 0, has_cell_data: false };
     let cells = vtk.read_cells(target)?;
     let label = target.label("");
     let mut counts = CellCounts::default();
@@ -177,6 +181,9 @@ pub(super) fn read_surface<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) 
             .map_err(|fault| vtk.feed.refuse(fault))?;
     }
     counts.note(target);
+    if vtk.has_cell_data {
+        target.builder.note(NoteKind::Said(CELL_VALUES.to_owned()));
+    }
     vtk.feed.finish(target.builder)
 }
 
@@ -222,14 +229,52 @@ impl<R: BufRead> Vtk<R> {
                         cells.push((cell, self.integer(b"int")?));
                     }
                 }
+                b"FIELD" => self.skip_field()?,
                 // Values at points and cells follow.
-                b"POINT_DATA" | b"CELL_DATA" | b"FIELD" => break,
+                b"CELL_DATA" => self.has_cell_data = true,
+                b"POINT_DATA" => {
+                    self.has_cell_data = self.feed.skip_past(b"\nCELL_DATA ").is_ok();
+                }
                 word => {
                     return Err(self.feed.unexpected("POINTS, LINES, VERTICES or CELLS", word));
                 }
             }
+            if self.has_cell_data || self.feed.word() == b"POINT_DATA" {
+                break;
+            }
         }
-        Ok(cells)
+        match mixed.is_empty() {
+            true => Ok(cells),
+            false => Err(self.feed.truncated("CELL_TYPES")),
+        }
+    }
+
+    /// Skips arrays that belong to the whole file.
+    fn skip_field(&mut self) -> Result<()> {
+        self.feed.need_word("the name of a field")?;
+        for _ in 0..self.feed.count("arrays", 4)? {
+            self.feed.need_word("the name of an array")?;
+            if self.feed.word() == b"METADATA" {
+                self.skip_metadata()?;
+                self.feed.need_word("the name of an array")?;
+            }
+            let (n, m) = (self.feed.count("components", 1)?, self.feed.count("values", 1)?);
+            let n = self.feed.check_count("values", n.saturating_mul(m) as i64, 1)?;
+            self.feed.need_word("a type of numbers")?;
+            let bytes = match self.feed.word() {
+                b"char" | b"unsigned_char" => 1,
+                b"short" | b"unsigned_short" => 2,
+                b"int" | b"unsigned_int" | b"float" => 4,
+                b"long" | b"unsigned_long" | b"double" | b"vtktypeint64" | b"vtkIdType" => 8,
+                _ => return Err(self.feed.unexpected("a type of numbers", self.feed.word())),
+            };
+            self.feed.skip_line()?;
+            match self.is_binary {
+                true => self.feed.skip_bytes(n * bytes)?,
+                false => (0..n).try_for_each(|_| self.feed.need_word("a number"))?,
+            }
+        }
+        Ok(())
     }
 
     /// Begins a list of numbers: binary ones begin after the end of the line.

@@ -5,10 +5,11 @@
 use std::io::{BufRead, Read};
 
 use super::feed::{Feed, check_point, quote};
-use super::vtk::{CellCounts, Shape, shape};
+use super::vtk::{CELL_VALUES, CellCounts, Shape, shape};
 use super::xml::Tag;
 use super::{FilePlace, ReadFault, Result, Spot, SurfaceSink};
 use tetdb_base::geom::Point;
+use tetdb_base::surface::NoteKind;
 
 /// An array of a piece.
 pub(super) struct Array {
@@ -63,7 +64,16 @@ impl Piece {
             };
             cell.iter().map(vertex).collect()
         };
-        ends.iter().map(cell).collect()
+        let cells = ends.iter().map(cell).collect::<Result<Vec<_>>>()?;
+        let used = ends.last().map_or(0, |&end| end as usize);
+        match used == vertices.len() {
+            true => Ok(cells),
+            false => Err(place.refuse(ReadFault::CountMismatch {
+                what: "vertices of cells",
+                declared: used.to_string(),
+                found: format!("{} in the array", vertices.len()),
+            })),
+        }
     }
 }
 
@@ -293,7 +303,9 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, limit: u64, target: &mut SurfaceSi
     let refuse = |source| place.refuse(ReadFault::Surface(source));
     let label = target.label("");
     let (mut first, mut cells_of) = (0, CellCounts::default());
+    let mut has_cell_data = false;
     for piece in pieces(feed, limit)? {
+        has_cell_data |= piece.arrays.iter().any(|array| array.section == "CellData");
         for p in piece.points() {
             check_point(p, &place)?;
             target.builder.vertex(p).map_err(refuse)?;
@@ -304,7 +316,15 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, limit: u64, target: &mut SurfaceSi
             shapes.extend(cells.into_iter().map(|cell| (cell, shape(kind))));
         }
         let kinds = piece.values("Cells", "types");
-        let cells = piece.cells("Cells", &place)?.into_iter();
+        let cells = piece.cells("Cells", &place)?;
+        if cells.len() != kinds.len() {
+            return Err(place.refuse(ReadFault::CountMismatch {
+                what: "types of cells",
+                declared: kinds.len().to_string(),
+                found: format!("{} cells", cells.len()),
+            }));
+        }
+        let cells = cells.into_iter();
         shapes.extend(cells.zip(kinds).map(|(cell, &kind)| (cell, shape(kind as i64))));
         for (mut cell, shape) in shapes {
             cell.iter_mut().for_each(|v| *v += first);
@@ -313,6 +333,9 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, limit: u64, target: &mut SurfaceSi
         first = target.builder.n_file_vertices() as u32;
     }
     cells_of.note(target);
+    if has_cell_data {
+        target.builder.note(NoteKind::Said(CELL_VALUES.to_owned()));
+    }
     match target.builder.n_file_triangles() {
         0 => Err(place.refuse(ReadFault::Empty)),
         _ => target.builder.end_file().map_err(refuse),

@@ -12,7 +12,7 @@ fn medit_text() {
         (surface.label_names, surface.labels),
         (vec!["7".into(), "9".into()], vec![0, 0, 1, 1])
     );
-    assert_eq!(surface.notes[0].kind, NoteKind::SkippedElements { what: "tetrahedra", n: 1 });
+    assert_eq!(surface.notes[1].kind, NoteKind::SkippedElements { what: "tetrahedra", n: 1 });
     let (head, rest) = MEDIT.split_at(MEDIT.find("Vertices").unwrap());
     let (vertices, rest) = rest.split_at(rest.find("Edges").unwrap());
     let late = format!("{head}{}{vertices}End\n", rest.replace("End\n", ""));
@@ -59,7 +59,7 @@ pub(super) fn meshb(version: i32, big: bool) -> Vec<u8> {
     };
     section(&mut out, 3, 4);
     put!(3i32);
-    section(&mut out, 99, 3); // a section no one knows
+    section(&mut out, 199, 3); // a section no one knows
     out.extend([1, 2, 3]);
     section(&mut out, 4, int + 4 * (3 * real + int));
     sized!(long_int, 4);
