@@ -48,8 +48,8 @@ fn vertices_on_triangles_become_theirs_and_the_surface_stays() {
     }
     points.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
     points.dedup();
-    let set = set(&points, &[]);
-    let n = surface.divide_at(&set, &scratch).expect("few triangles");
+    let mut set = set(&points, &[]);
+    let n = surface.divide_at(&mut set, 0.0, &scratch).expect("few triangles");
     assert!(n > 200 && surface.n_vertices() == whole.n_vertices() + n);
     surface.embed_set(&set, "in", &scratch).expect("each is a vertex");
     assert!(surface.isolated_points().is_empty());
@@ -79,8 +79,8 @@ fn a_vertex_beside_a_triangle_divides_nothing_and_is_refused_with_its_distance()
     let mut surface = unit_box();
     let bounds = surface.bounds();
     let (middle, beside) = (bounds.low.midpoint(bounds.high), bounds.high.z.next_down());
-    let set = set(&[[middle.x + 0.1, middle.y + 0.01, beside]], &[]);
-    assert_eq!(surface.divide_at(&set, &scratch).expect("nothing to do"), 0);
+    let mut set = set(&[[middle.x + 0.1, middle.y + 0.01, beside]], &[]);
+    assert_eq!(surface.divide_at(&mut set, 0.0, &scratch).expect("nothing to do"), 0);
     let error = surface.embed_set(&set, "in", &scratch);
     let text = error.expect_err("too near").to_string();
     assert!(text.contains("can be meshed: 1.1e-16 from it"), "{text}");
@@ -93,7 +93,7 @@ fn edges_along_edges_of_triangles_are_divided_with_them() {
     let Aabb { low, high } = surface.bounds();
     let at = |share: [f64; 3]| (low + (high - low) * Point::from_array(share)).to_array();
     // From vertices on the top into the box, and from a corner along its edge.
-    let set = set(
+    let mut set = set(
         &[
             [0.3125, 0.4375, 1.0],
             [0.6875, 0.5625, 1.0],
@@ -104,7 +104,7 @@ fn edges_along_edges_of_triangles_are_divided_with_them() {
         .map(at),
         &[[0, 2], [2, 1], [3, 4]],
     );
-    assert_eq!(surface.divide_at(&set, &scratch).expect("few"), 3);
+    assert_eq!(surface.divide_at(&mut set, 0.0, &scratch).expect("few"), 3);
     surface.embed_set(&set, "in", &scratch).expect("vertices");
     let (fine, _) = tetdb_base::surface::split(&surface, &|_| 0.04, u64::MAX).expect("few");
     let fine = in_order(&fine);
