@@ -5,7 +5,7 @@
 //! was moved there, bends it by rounding. Which triangles it divides then follows from the triangles' vertices alone, so
 //! the surface stays closed. Validation afterwards finds out, with exact signs, whether the bend does harm.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::box_pairs::tree_of;
 use super::embedded::NEAR_SHARE;
@@ -78,7 +78,8 @@ impl Surface {
         let mut table = PointTable::new(&self.points);
         let mut points = std::mem::take(&mut self.points);
         let mut pieces = TrianglePieces::new(&self.triangles);
-        let mut vertices = HashMap::new();
+        let (mut vertices, mut by_place) = (HashMap::new(), HashMap::new());
+        let mut taken = HashSet::new();
         let mut done = Divided::default();
         let ends = set.edges.iter().flat_map(|&[a, b, _]| [a, b]);
         for v in ends.chain(set.marks.iter().map(|&[v, _]| v)) {
@@ -86,12 +87,17 @@ impl Surface {
                 continue;
             }
             let given = set.points[v as usize] + Point::ZERO;
+            if let Some(&vertex) = by_place.get(&given.to_array().map(f64::to_bits)) {
+                vertices.insert(v, vertex);
+                set.points[v as usize] = points[vertex as usize];
+                continue;
+            }
             let (mut p, mut places) = (given, Vec::new());
             if within == 0.0 {
                 tree.meeting(&Aabb::around([p]), |t| places.extend(pieces.at(t, p, &points)));
             }
             if places.is_empty() && !(within == 0.0 && table.find(p, &points)) {
-                let found = pieces.nearest(&tree, p, &points, &reach);
+                let found = pieces.nearest(&tree, p, &points, &reach, &taken);
                 places.extend(found.map(|(at, place)| {
                     p = at;
                     place
@@ -103,6 +109,8 @@ impl Surface {
                 _ => table.find_or_add(p, &mut points),
             };
             vertices.insert(v, vertex);
+            by_place.insert(given.to_array().map(f64::to_bits), vertex);
+            taken.insert(vertex);
             if p != given {
                 set.points[v as usize] = p;
                 done.moved += 1;
@@ -232,13 +240,14 @@ impl TrianglePieces {
         found
     }
 
-    /// The place within reach that `p` is moved to, and where it lies then.
+    /// The place within reach that `p` is moved to, and where it lies then. Vertices that other points have `taken` are not taken again.
     fn nearest(
         &self,
         tree: &BoxTree,
         p: Point,
         points: &[Point],
         reach: &Reach,
+        taken: &HashSet<u32>,
     ) -> Option<(Point, Place)> {
         let near = |d: f64| d < reach.within || d <= reach.rounding;
         let around = self.around(tree, p, reach.within.max(reach.rounding), points, reach);
@@ -252,6 +261,7 @@ impl TrianglePieces {
             (at.distance(foot) <= reach.feature && near(at.distance(p))).then(|| at.distance(p))
         };
         let corners = around.iter().flat_map(|&t| self.corners[t as usize]);
+        let corners = corners.filter(|v| !taken.contains(v));
         let corners = corners.filter_map(|v| Some((best(points[v as usize])?, v)));
         if let Some((_, v)) = corners.min_by(|a, b| a.0.total_cmp(&b.0)) {
             return Some((points[v as usize], Place::Vertex(v)));
