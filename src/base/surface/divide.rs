@@ -275,12 +275,12 @@ impl TrianglePieces {
             Some((_, at, edge)) => (at, Place::Edge(edge)),
             None => (foot, Place::Triangle(t)),
         };
-        // A point that is there but for rounding stays, unless it can come to lie there exactly.
-        let is_exact = match place {
-            Place::Edge(e) => is_on_edge(at, e.map(|v| points[v as usize])),
-            _ => point_at_triangle(at, &self.corners(t, points)).is_some(),
+        // A point that is there but for rounding stays, unless it alone does not lie there exactly.
+        let is_exact = |x: Point| match place {
+            Place::Edge(e) => is_on_edge(x, e.map(|v| points[v as usize])),
+            _ => point_at_triangle(x, &self.corners(t, points)).is_some(),
         };
-        let stays = at.distance(p) <= reach.rounding && !is_exact;
+        let stays = at.distance(p) <= reach.rounding && (is_exact(p) || !is_exact(at));
         Some((if stays { p } else { at }, place))
     }
 

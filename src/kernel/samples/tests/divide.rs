@@ -65,6 +65,10 @@ fn vertices_on_triangles_become_theirs_and_the_surface_stays() {
             })
             .sum()
     };
+    // What lies there exactly stays, also where points may move.
+    let mut again = set.clone();
+    whole.clone().divide_at(&mut again, 1e-9, &scratch).expect("few triangles");
+    assert_eq!(again, set);
     assert!((area(&surface) - area(&whole)).abs() < 1e-12 * area(&whole));
     let names = |s: &Surface| s.label_names[..whole.label_names.len()].to_vec();
     assert_eq!(names(&surface), names(&whole));
