@@ -12,7 +12,9 @@ use super::input;
 use super::memory;
 use super::words;
 use tetdb_engine::api::targets::check_target;
-use tetdb_engine::api::{Code, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short};
+use tetdb_engine::api::{
+    Code, MeshOptions, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short,
+};
 
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are validated before anything is read.
@@ -28,8 +30,8 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     }
     // A check writes no temporary files next to its input.
     let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
-    let sheets = (&args.sheets, false);
-    let mut surface = input::load_with(&args.surfaces, sheets, &settings, console)?;
+    let options = MeshOptions::default();
+    let mut surface = input::load_with(&args.surfaces, &args.sheets, &options, &settings, console)?;
     let mut repair = None;
     if args.repair {
         let done;

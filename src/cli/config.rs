@@ -73,6 +73,8 @@ fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
         sizes,
         config: _,
         refine_surface,
+        snap_embedded,
+        embed_outside,
         regions,
         region_seed,
         hole,
@@ -93,6 +95,8 @@ fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
         seal: seal.map(|seal| seal.word().to_owned()),
         keep_stages: *keep_stages,
         refine_surface: *refine_surface,
+        snap_embedded: snap_embedded.clone(),
+        embed_outside: embed_outside.map(|outside| outside.word().to_owned()),
         ..sizes_of(sizes)
     };
     if let Some(path) = file_of_seeds {

@@ -146,16 +146,16 @@ fn help_of(code: Code) -> &'static str {
             "cut sheets off where they leave the filled regions, or fill the region they lie in (--regions)"
         }
         Code::WireOutside => {
-            "leave out what is outside the filled regions, or fill the region it lies in (--regions)"
+            "--embed-outside skip leaves it out; --snap-embedded DIST moves onto the surface what is only just outside; or fill the region it lies in (--regions)"
         }
         Code::DegenerateEdge | Code::DuplicateWire => {
             "give each edge and each point once, edges between different vertices"
         }
         Code::WireContact => {
-            "edges and points meet triangles, and edges each other, in common vertices alone; `--refine-surface` puts in what lies exactly on one"
+            "edges and points meet triangles, and edges each other, in common vertices alone; `--refine-surface` puts in what lies on one, and `--snap-embedded DIST` what lies near one"
         }
         Code::WireTooNear => {
-            "join what is meant to meet, or move it apart: beside a triangle is not on it"
+            "join what is meant to meet, or move it apart; --snap-embedded DIST moves points and ends that are nearer to a triangle onto it"
         }
         Code::NothingToUndo => {
             "only the last `tetdb resaturate` can be undone, once, and not after --forget"

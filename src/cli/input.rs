@@ -6,7 +6,7 @@ use super::args::SheetArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::words::count;
-use tetdb_engine::api::{Code, EmbeddedKind, Settings, Surface, SurfaceWritten};
+use tetdb_engine::api::{Code, EmbeddedKind, MeshOptions, Settings, Surface, SurfaceWritten};
 
 /// The same settings, with temporary files in the folder of `file` or its nearest existing parent.
 pub fn scratch_beside(settings: Settings, file: &Path) -> Settings {
@@ -30,10 +30,11 @@ pub fn note_lost(surface: &Surface, written: SurfaceWritten, console: &Console) 
 
 /// Reads files or generates a sample, and embeds sheets, edges and points.
 ///
-/// If the surface `divides`, triangles are divided where edges and points lie on them.
+/// As `options` say, triangles are divided where edges and points lie on them, and points are moved there.
 pub fn load_with(
     arguments: &[String],
-    (sheets, divides): (&SheetArgs, bool),
+    sheets: &SheetArgs,
+    options: &MeshOptions,
     settings: &Settings,
     console: &Console,
 ) -> Result<Surface, Failure> {
@@ -61,8 +62,11 @@ pub fn load_with(
         let sheet = Surface::load(std::slice::from_ref(file), settings)?;
         surface = surface.embedded(sheet, name_of(file))?;
     }
-    if divides {
+    if options.refine_surface {
         surface = surface.dividing();
+    }
+    if let Some(within) = options.snap_embedded {
+        surface = surface.snapping(within);
     }
     surface = surface.own_edges_with(settings)?;
     let edges = sheets.embed_edges.iter().map(|file| (file, EmbeddedKind::Edges));

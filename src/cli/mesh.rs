@@ -34,7 +34,8 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     Mesher::check_path(&path, existing)?;
     let surface = input::load_with(
         &args.surfaces,
-        (&args.sheets, options.refine_surface),
+        &args.sheets,
+        &options,
         &input::scratch_beside(settings.clone(), &path),
         console,
     )?;

@@ -8,7 +8,7 @@ use super::failure::Failure;
 use super::input;
 use super::words::quoted;
 use super::{memory, threads};
-use tetdb_engine::api::{Code, Settings, Store, VerifyLevel};
+use tetdb_engine::api::{Code, MeshOptions, Settings, Store, VerifyLevel};
 
 pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     let embeds = args.sheets.files().next().is_some() || args.sheets.allow_open;
@@ -24,8 +24,9 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     let found = match args.against.is_empty() {
         true => store.verify(level)?,
         false => {
-            let sheets = (&args.sheets, false);
-            let surface = input::load_with(&args.against, sheets, &settings, console)?;
+            let options = MeshOptions::default();
+            let surface =
+                input::load_with(&args.against, &args.sheets, &options, &settings, console)?;
             store.verify_against(&surface, level)?
         }
     };

@@ -170,17 +170,17 @@ fn points_and_ends_on_triangles_are_put_into_a_surface_that_may_be_divided() {
         place.run_line(&line).succeeds().stdout().lines().count()
     };
     assert!(found("sheet") > 20);
-    // Closer to the bottom, a square, than can be meshed.
+    // Closer to the bottom than can be meshed, and farther away than by rounding.
     for (file, text, option) in [
-        ("near.csv", "0.5,0.25,1e-17\n", "points"),
-        ("near.obj", "v .5 .5 .5\nv .5 .25 1e-17\nl 1 2\n", "edges"),
+        ("near.csv", "0.5,0.25,1e-13\n", "points"),
+        ("near.obj", "v .5 .5 .5\nv .5 .25 1e-13\nl 1 2\n", "edges"),
     ] {
         place.write(file, text);
         let line = format!("mesh box.obj --embed-{option} {file} --refine-surface --json");
         let error = place.run_line(&line).error();
         assert_eq!(error["code"], "wire-too-near", "{file}: {error}");
         assert!(
-            error["message"].as_str().is_some_and(|m| m.contains("1.0e-17 from it")),
+            error["message"].as_str().is_some_and(|m| m.contains("1.0e-13 from it")),
             "{error}"
         );
     }
@@ -285,4 +285,80 @@ fn polygons_of_two_corners_in_a_surface_are_embedded_edges() {
     assert_eq!(place.digest("rods.tetdb"), place.digest("two.tetdb"));
     let again = place.run_line("mesh rods.poly -o rods.tetdb").succeeds().stderr();
     assert!(again.contains("already holds"), "{again}");
+}
+
+/// A tetrahedron with a slanted side, x/10 + y/10 + z/7 = 1.
+const SLANTED: &str = "v 0 0 0\nv 10 0 0\nv 0 10 0\nv 0 0 7\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+#[test]
+fn points_near_the_surface_are_moved_onto_it_where_that_is_asked_for() {
+    let place = Place::new();
+    place.write("slanted.obj", SLANTED);
+    // Outside and inside of the slanted side, beside an edge and beside a corner.
+    place
+        .write("near.csv", "2,3,3.5001\n3,2,3.4999\n5.00003,5.00002,0\n9.99999,0.00001,0\n1,1,1\n");
+    place.write("rod.obj", "v 1 2 1\nv 4 1 3.49995\nl 1 2\n");
+    let embedded = "--embed-edges rod.obj --embed-points near.csv";
+    let refused = place.run_line(&format!("mesh slanted.obj {embedded} --refine-surface --json"));
+    assert_eq!(refused.error()["code"], "wire-outside");
+    for (within, store) in [("0.001", "a"), ("0.01%", "b")] {
+        let line = format!("mesh slanted.obj {embedded} --snap-embedded {within} -o {store}.tetdb");
+        let notes = place.run_line(&line).succeeds().stderr();
+        assert!(notes.contains("near: 4 embedded points") && notes.contains("rod: 1 "), "{notes}");
+        place.run_line(&format!("resaturate {store}.tetdb --subdomain 0 --hgrad 1.2")).succeeds();
+        let verified = place.run_line(&format!("verify {store}.tetdb --full --json"));
+        let verified = verified.succeeds().json();
+        let found = (&verified["edges_present"], &verified["points_present"]);
+        assert_eq!(found, (&1.into(), &5.into()));
+    }
+    // In a file of options, and with refinement.
+    place.write("o.toml", "snap_embedded = 0.001\nhsiz = 2\nrefine_surface = true\n");
+    place.run_line(&format!("mesh slanted.obj {embedded} --config o.toml -o c.tetdb")).succeeds();
+    place.run_line("verify c.tetdb --full").succeeds();
+    for (within, code) in [("0", "bad-size"), ("-1%", "bad-size"), ("x", "bad-size")] {
+        let line = format!("mesh slanted.obj {embedded} --snap-embedded {within} --json");
+        assert_eq!(place.run_line(&line).error()["code"], code, "{within}");
+    }
+    // Two points whose nearest place is one corner.
+    place.write("same.csv", "10.0001,0,0\n10.0002,0,0\n");
+    let line = "mesh slanted.obj --embed-points same.csv --snap-embedded 0.001 --json";
+    assert_eq!(place.run_line(line).error()["code"], "duplicate-wire");
+}
+
+#[test]
+fn what_is_embedded_outside_is_left_out_where_that_is_asked_for() {
+    let place = Place::new();
+    place.write("box.obj", BOX);
+    place.write("some.csv", "0.5,0.5,0.5,in\n2,2,2,out\n0.5,0.5,1.25,out\n.3,.6,.2,in\n");
+    place.write("all.csv", "2,2,2,out\n");
+    place.write("inner.csv", "0.5,0.5,0.5,in\n.3,.6,.2,in\n");
+    // A rod outside from a corner of the box, with points at its ends, and one inside.
+    place.write("rods.obj", "v 1 1 1\nv 2 2 1\nv .5 .2 .3\nv .6 .4 .7\nl 1 2\nl 3 4\np 1\np 2\n");
+    let error = place.run_line("mesh box.obj --embed-points some.csv --json").error();
+    assert_eq!(error["code"], "wire-outside");
+    let message = error["message"].as_str().unwrap_or_default();
+    for words in ["2 of the embedded points", "point 0 of \"some:out\"", "1.7e0 from"] {
+        assert!(message.contains(words), "{message}");
+    }
+    for (embedded, left_out, edges, points) in [
+        ("--embed-points some.csv", "0 edges and 2 points outside", 0, 2),
+        ("--embed-points all.csv", "0 edges and 1 points outside", 0, 0),
+        ("--embed-points inner.csv", "", 0, 2),
+        ("--embed-edges rods.obj --embed-points rods.obj", "1 edges and 1 points outside", 1, 1),
+        ("--embed-edges rods.obj --refine-surface --hsiz 0.5", "1 edges and 0 points", 1, 0),
+    ] {
+        let line = format!("mesh box.obj {embedded} --embed-outside skip -o s.tetdb --force");
+        let notes = place.run_line(&line).succeeds().stderr();
+        assert!(notes.contains(left_out), "{embedded}: {notes}");
+        assert_eq!(notes.contains("were left out"), !left_out.is_empty(), "{embedded}: {notes}");
+        let verified = place.run_line("verify s.tetdb --full --json").succeeds().json();
+        let found = (&verified["edges_present"], &verified["points_present"]);
+        assert_eq!(found, (&edges.into(), &points.into()), "{embedded}");
+        let line = line.replace(" --force", "");
+        let again = place.run_line(&line).succeeds().stderr();
+        assert!(again.contains("already holds"), "{again}");
+    }
+    place.run_line("estimate box.obj --embed-points some.csv --embed-outside skip").succeeds();
+    let words = "mesh box.obj --embed-points some.csv --embed-outside drop --json";
+    assert_eq!(place.run_line(words).error()["code"], "usage");
 }

@@ -131,7 +131,7 @@ impl EmbedError {
                 "edges and points meet triangles, and edges each other, in common vertices alone: divide the triangle or the edge there"
             }
             Self::TooNear { .. } => {
-                "join what is meant to meet, or move it apart: what is not exactly on a triangle is beside it, however near, \
+                "join what is meant to meet, or move it apart: what is farther from a triangle than by rounding is beside it, \
                  so give the triangle a vertex there"
             }
         }

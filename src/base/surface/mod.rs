@@ -51,6 +51,7 @@ pub use cells::CellBoundary;
 pub use contact::{Contact, ContactKind, contact};
 pub use defect::{Defect, SurfaceError};
 pub use defect::{show, triangle_name};
+pub use divide::Divided;
 pub use edges::{Closedness, closedness};
 pub use embedded_set::{EmbedError, Embedded, EmbeddedSet};
 pub use fitness::{Fitness, fitness};

@@ -44,6 +44,19 @@ impl PointTable {
         }
     }
 
+    /// Returns whether `p` is one of the points.
+    pub fn find(&self, p: Point, points: &[Point]) -> bool {
+        let mask = self.slots.len() - 1;
+        let mut slot = point_hash(p) as usize & mask;
+        while let Some(id) = self.slots[slot].checked_sub(1) {
+            if points[id as usize] == p {
+                return true;
+            }
+            slot = (slot + 1) & mask;
+        }
+        false
+    }
+
     fn grow(&mut self, points: &[Point]) {
         let len = (self.slots.len() * 2).max(1024);
         self.slots = Vec::new();

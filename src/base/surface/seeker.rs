@@ -225,7 +225,7 @@ fn distance2(b: &Aabb, p: Point) -> f64 {
 }
 
 /// The point of a triangle nearest to `p`: on its face, an edge or at a corner.
-fn nearest_point([a, b, c]: [Point; 3], p: Point) -> Point {
+pub(super) fn nearest_point([a, b, c]: [Point; 3], p: Point) -> Point {
     let normal = (b - a).cross(c - a);
     let beyond = |from: Point, to: Point| (to - from).cross(p - from).dot(normal);
     let sides = [beyond(b, c), beyond(c, a), beyond(a, b)];
@@ -233,12 +233,14 @@ fn nearest_point([a, b, c]: [Point; 3], p: Point) -> Point {
     if sum > 0.0 && sides.iter().all(|&s| s >= 0.0) {
         return (a * sides[0] + b * sides[1] + c * sides[2]) / sum;
     }
-    let on_edge = |from: Point, to: Point| {
-        let along = to - from;
-        let t = (p - from).dot(along) / along.length_squared();
-        from + along * if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 }
-    };
-    let ends = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
+    let ends = [(a, b), (b, c), (c, a)].map(|(from, to)| nearest_on_edge(from, to, p));
     let nearer = |x: Point, y: Point| if p.distance(y) < p.distance(x) { y } else { x };
     ends.into_iter().reduce(nearer).unwrap_or(a)
+}
+
+/// The point of an edge nearest to `p`.
+pub(super) fn nearest_on_edge(from: Point, to: Point, p: Point) -> Point {
+    let along = to - from;
+    let t = (p - from).dot(along) / along.length_squared();
+    from + along * if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 }
 }

@@ -55,7 +55,8 @@ impl Surface {
                 None => near.push(e),
             }
         }
-        self.refuse_near(&near, None)?;
+        let distance = near.first().map(|&e| self.clearance(e as u32, &seeker));
+        self.refuse_near(&near, distance)?;
         if apexes.is_empty() {
             return Ok(());
         }
@@ -107,6 +108,28 @@ impl Surface {
             });
         }
         heights_max
+    }
+
+    /// Distance from edge `e` to other edges and points, and of its middle to triangles; from an edge that shares a vertex, that of the
+    /// other ends.
+    fn clearance(&self, e: u32, seeker: &Seeker) -> f64 {
+        let edge = self.embedded_edge(e);
+        let [a, b] = edge.ends;
+        let mut least = seeker.distance(a.midpoint(b), f64::INFINITY);
+        for f in (0..self.embedded.edges.len() as u32).filter(|&f| f != e) {
+            let other = self.embedded_edge(f);
+            least = least.min(match edge.ids.iter().position(|v| other.ids.contains(v)) {
+                None => between_edges(edge.ends, other.ends),
+                Some(i) => {
+                    let k = usize::from(other.ids[1] == edge.ids[i]);
+                    to_edge(edge.ends[1 - i], other.ends).min(to_edge(other.ends[1 - k], edge.ends))
+                }
+            });
+        }
+        for &[v, _] in self.embedded.points.iter().filter(|[v, _]| !edge.ids.contains(v)) {
+            least = least.min(to_edge(self.points[v as usize], edge.ends));
+        }
+        least
     }
 
     /// The apex at edge `e`, at `height` or less, with the largest distance from other triangles; `None` below `least`.

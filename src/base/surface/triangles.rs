@@ -166,7 +166,7 @@ pub enum NoteKind {
         /// Number of cells.
         n: u64,
     },
-    /// What a caller that gives arrays says of them.
+    /// Words of the caller.
     Said(String),
     /// Regions whose solid elements belong to several groups have no name.
     MixedRegions {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tetdb_engine::api::{Optimize, Regions, Seal};
+use tetdb_engine::api::{EmbedOutside, Optimize, Regions, Seal};
 
 use super::words::word_of;
 
@@ -19,6 +19,8 @@ const OPTIMIZE: &[&str] = &[
     "Only changes that keep the mesh locally Delaunay",
     "Until no badly shaped tetrahedron can be improved",
 ];
+const OUTSIDE: &[&str] =
+    &["Refuse them, with the first one", "Leave them out, and count them in a note"];
 const SEAL: &[&str] = &[
     "In chunks, packed",
     "As the pages they are worked in: no time is taken to pack or unpack them, at six times the bytes",
@@ -72,6 +74,18 @@ pub struct ShapeArgs {
     /// without moving the surface
     #[arg(long, help_heading = "Sizes")]
     pub refine_surface: bool,
+    /// Move embedded points and ends of embedded edges onto triangles nearer than this, and divide the triangles there: a length, or 1%
+    /// of the box diagonal
+    #[arg(
+        long,
+        value_name = "DIST",
+        allow_hyphen_values = true,
+        help_heading = "Inside the surface"
+    )]
+    pub snap_embedded: Option<String>,
+    /// What to do with embedded points and edges outside the filled regions [default: error]
+    #[arg(long, value_name = "HOW", value_parser = word_of::<EmbedOutside>(OUTSIDE), help_heading = "Inside the surface")]
+    pub embed_outside: Option<EmbedOutside>,
     /// Which regions to fill [default: what the surface's files say, else parity; with seeds or holes: seeds]
     #[arg(long, value_name = "RULE", value_parser = word_of::<Regions>(REGIONS), help_heading = "Regions")]
     pub regions: Option<Regions>,

@@ -40,6 +40,8 @@ pub fn is_same(job: &Job, options: &MeshOptions, surfaces: &[Source]) -> bool {
         // Kept snapshots and the storage form do not affect the mesh.
         o.drop_coarse = options.drop_coarse;
         o.seal = options.seal;
+        // What these did is in the surface that the store keeps.
+        (o.snap_embedded, o.embed_outside) = (options.snap_embedded, options.embed_outside);
         o == *options
     });
     same && job.surfaces.len() == surfaces.len()

@@ -11,12 +11,12 @@ use super::prediction::Prediction;
 use super::preflight::{self, preflight, scratch_beside, with_free_space};
 use super::store::say_how_locked;
 use super::{
-    Bytes, Error, Event, Optimize, Regions, Seal, Settings, Sizes, Store, Subdomains, Surface,
-    Verification, guarded, job, replace, verify,
+    Bytes, EmbedOutside, Error, Event, Optimize, Regions, Seal, Settings, Sizes, Store, Subdomains,
+    Surface, Verification, guarded, job, replace, verify,
 };
 use crate::pipeline::{self, MeshOptions, Options, PipelineError, Prepared, RECIPE};
 use tetdb_base::geom::Point;
-use tetdb_base::storage::{Budget, CancelToken, attempt, n_threads};
+use tetdb_base::storage::{Budget, CancelToken, ScratchSpace, attempt, n_threads};
 use tetdb_base::surface::{self, Seed, SeedKind};
 use tetdb_schema::catalog::StoreState;
 use tetdb_store::audit::Level;
@@ -186,6 +186,14 @@ impl Mesher {
         self
     }
 
+    /// Sets the treatment of embedded edges and points outside all filled regions. Default: an error.
+    ///
+    /// If they are left out, the store keeps a copy of the surface without them.
+    pub fn embed_outside(mut self, outside: EmbedOutside) -> Self {
+        self.options.mesh.embed_outside = outside;
+        self
+    }
+
     /// Sets whether the run ends with the coarse mesh. [`Tasks`](super::Tasks) or [`Store::resume`] then do the rest. Default: false.
     pub fn coarse_only(mut self, coarse_only: bool) -> Self {
         self.options.run.coarse_only = coarse_only;
@@ -278,6 +286,9 @@ impl Mesher {
             let mut surface = Cow::Borrowed(&self.surface);
             let scratch = scratch_beside(&surface.inner, cap, store)?;
             attempt(|| surface::validate_with(&surface.inner, &scratch))?.accept()?;
+            if skips_outer(&surface, &options) {
+                leave_out(surface.to_mut(), &options, &scratch, &self.settings)?;
+            }
             if options.mesh.refine_surface {
                 divide(surface.to_mut(), &options, field, cap, store, &self.settings)?;
             }
@@ -318,6 +329,11 @@ impl Mesher {
         self.options.run.remote = settings.remote.clone();
         let cap = settings.cap()?;
         replace::settle(path, settings)?;
+        if skips_outer(&self.surface, &self.options) {
+            let scratch = scratch_beside(&self.surface.inner, cap, path)?;
+            attempt(|| surface::validate_with(&self.surface.inner, &scratch))?.accept()?;
+            leave_out(&mut self.surface, &self.options, &scratch, settings)?;
+        }
         if self.options.mesh.refine_surface {
             self.divide_surface(path, cap, settings)?;
         }
@@ -516,6 +532,30 @@ pub(super) fn report(summary: &pipeline::Summary, settings: &Settings) {
             settings.say(&Event::SizeWarning(warning.clone()));
         }
     }
+}
+
+/// Returns whether embedded edges and points outside the filled regions are to be left out.
+fn skips_outer(surface: &Surface, options: &Options) -> bool {
+    options.mesh.embed_outside == EmbedOutside::Skip && surface.inner.has_embedded()
+}
+
+/// Leaves out embedded edges and points of a surface without defects that are outside the filled regions.
+fn leave_out(
+    surface: &mut Surface,
+    options: &Options,
+    scratch: &ScratchSpace,
+    settings: &Settings,
+) -> Result<(), Error> {
+    let outer = attempt(|| pipeline::outer_embedded(&surface.inner, options, scratch))??;
+    if outer.is_empty() {
+        return Ok(());
+    }
+    settings.note(format!(
+        "note: {} edges and {} points outside the filled regions were left out",
+        outer.edges.len(),
+        outer.points.len()
+    ));
+    surface.without_wires(&outer.edges, &outer.points, scratch)
 }
 
 /// Divides the triangles of a surface without defects to the lengths that `options` require.

@@ -91,7 +91,7 @@ pub use memory::show_bytes;
 pub use memory::{Bytes, MEMORY_LEAST};
 use mesher::predict;
 pub use mesher::{Created, Existing, Mesher, PageTraffic};
-pub use options::{Length, Optimize, Regions, Seal, Subdomains, typed};
+pub use options::{EmbedOutside, Length, Optimize, Regions, Seal, Subdomains, typed};
 pub use page::{Reported, ShownTriangles};
 pub use picture::{ColorBy, Snapped, Snapshot};
 pub use prediction::{Prediction, WorkersPrediction};

@@ -1,6 +1,6 @@
 //! Options of a mesh other than its sizes.
 
-pub use crate::pipeline::Subdomains;
+pub use crate::pipeline::{EmbedOutside, Subdomains};
 pub use tetdb_kernel::boundary::RegionPolicy as Regions;
 pub use tetdb_kernel::optimize::Mode as Optimize;
 pub use tetdb_kernel::sizing::Length;

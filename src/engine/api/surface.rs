@@ -33,6 +33,8 @@ pub struct Surface {
     pub turned: usize,
     /// True if triangles are divided where embedded edges and points lie on them.
     pub(super) divides: bool,
+    /// Distance within which embedded points and ends of embedded edges are moved onto triangles.
+    pub(super) snaps: Option<Length>,
 }
 
 /// Defects of a surface, and measures of its triangles.
@@ -460,7 +462,7 @@ impl Surface {
     }
 
     fn of(inner: surface::Surface, sources: Vec<Source>) -> Self {
-        Self { inner, sources, turned: 0, divides: false }
+        Self { inner, sources, turned: 0, divides: false, snaps: None }
     }
 
     fn generated(word: &str, cap: u64) -> Result<Self, Error> {

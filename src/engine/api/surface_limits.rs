@@ -42,7 +42,10 @@ impl Surface {
     ) -> Result<Self, Error> {
         guarded(settings, || {
             let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
-            self.with_wires(file.as_ref(), kind, name, &scratch)
+            let n_notes = self.inner.notes.len();
+            let surface = self.with_wires(file.as_ref(), kind, name, &scratch)?;
+            surface.say_notes(n_notes, settings);
+            Ok(surface)
         })
     }
 
@@ -51,8 +54,16 @@ impl Surface {
     pub fn own_edges_with(self, settings: &Settings) -> Result<Self, Error> {
         guarded(settings, || {
             let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
-            self.with_own_edges(&scratch)
+            let n_notes = self.inner.notes.len();
+            let surface = self.with_own_edges(&scratch)?;
+            surface.say_notes(n_notes, settings);
+            Ok(surface)
         })
+    }
+
+    /// Reports notes from number `first` on.
+    fn say_notes(&self, first: usize, settings: &Settings) {
+        self.inner.notes[first..].iter().for_each(|note| settings.note(format!("note: {note}")));
     }
 
     /// [`Surface::validate`] within the memory of `settings`.

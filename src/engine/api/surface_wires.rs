@@ -1,5 +1,6 @@
 //! Embedding edges and points in a surface, from files and from arrays.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
@@ -9,23 +10,36 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::error::Error;
 use super::surface::{given, halves, source};
-use super::{Settings, Surface, guarded};
+use super::{Length, Settings, Surface, guarded};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, attempt};
-use tetdb_base::surface::{EmbeddedSet, NoteKind};
+use tetdb_base::surface::{Divided, EmbeddedSet, Note, NoteKind};
 use tetdb_io::read::{WireKind, is_stream, read_wires};
 use tetdb_io::write;
 
 impl Surface {
-    /// Lets later calls divide triangles where embedded points, or the ends of embedded edges, lie exactly on them.
+    /// Lets later calls divide triangles where embedded points, or the ends of embedded edges, lie on them.
     ///
-    /// A point inside a triangle divides it in three. A point on an edge divides all triangles at this edge in two. The surface stays
-    /// the same set of points. A point that misses a triangle by a rounding error is not on it, and is refused as `wire-too-near`, with
-    /// the distance. The store keeps a copy of a divided surface.
+    /// A point inside a triangle divides it in three. A point on an edge divides all triangles at this edge in two. A point that misses a
+    /// triangle by rounding, at most 1.8e-15 of the largest coordinate, lies on it. The surface then bends by that distance. The store
+    /// keeps a copy of a divided surface.
     ///
     /// Default: a point on a triangle is refused unless it is a corner.
     pub fn dividing(mut self) -> Self {
         self.divides = true;
+        self
+    }
+
+    /// Lets later calls move embedded points, and the ends of embedded edges, onto triangles nearer than `within`, and divides the
+    /// triangles there as [`Surface::dividing`] does.
+    ///
+    /// A point goes to the nearest place of the surface or of a sheet. It goes to a vertex instead that is at most a quarter of `within`
+    /// from that place, or else onto such an edge. A [note](Surface::notes) says how many points moved, and how far at most.
+    ///
+    /// Default: no point moves. Errors of the later calls: `bad-size` for a length that is none; `duplicate-wire` and `degenerate-edge`
+    /// where two points come to the same vertex.
+    pub fn snapping(mut self, within: Length) -> Self {
+        self.snaps = Some(within);
         self
     }
 
@@ -150,17 +164,42 @@ impl Surface {
         record: Option<Source>,
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
-        let n_divided = match self.divides {
-            true => attempt(|| self.inner.divide_at(set, scratch))??,
-            false => 0,
-        };
-        attempt(|| self.inner.embed_set(set, name, scratch))??;
+        let mut set = Cow::Borrowed(set);
+        let done = self.divide_at(&mut set, name, scratch)?;
+        attempt(|| self.inner.embed_set(&set, name, scratch))??;
         let is_kept = self.keeps_embedded();
         match record {
-            Some(record) if n_divided == 0 && !is_kept => self.sources.push(record),
+            Some(record) if done == Divided::default() && !is_kept => self.sources.push(record),
             _ => self.keep_all(scratch)?,
         }
         Ok(self)
+    }
+
+    /// Divides triangles where vertices of `set` lie on them, or are moved to.
+    fn divide_at(
+        &mut self,
+        set: &mut Cow<'_, EmbeddedSet>,
+        name: &str,
+        scratch: &ScratchSpace,
+    ) -> Result<Divided, Error> {
+        let within = match self.snaps {
+            None if !self.divides => return Ok(Divided::default()),
+            None => 0.0,
+            Some(within) => {
+                within.check("snap_embedded")?;
+                within.resolve(self.inner.bounds().diagonal())
+            }
+        };
+        let done = attempt(|| self.inner.divide_at(set.to_mut(), within, scratch))??;
+        if done.moved > 0 {
+            let Divided { moved, farthest, .. } = done;
+            let text = format!(
+                "{moved} embedded points or ends of edges were moved onto the surface, by {farthest:.1e} at most"
+            );
+            let (file, kind) = (name.to_owned(), NoteKind::Said(text));
+            self.inner.notes.push(Note { file, kind });
+        }
+        Ok(done)
     }
 
     /// Makes the store keep a copy of the whole surface, in the order in which the copy is read again.
@@ -182,6 +221,26 @@ impl Surface {
             self.sources.push(kept(&set));
         }
         Ok(())
+    }
+
+    /// Leaves out embedded edges and points, by their numbers in ascending order.
+    pub(super) fn without_wires(
+        &mut self,
+        edges: &[usize],
+        points: &[usize],
+        scratch: &ScratchSpace,
+    ) -> Result<(), Error> {
+        fn leave_out<T>(list: &mut Vec<T>, numbers: &[usize]) {
+            let mut i = 0..list.len();
+            list.retain(|_| i.next().is_some_and(|i| numbers.binary_search(&i).is_err()));
+        }
+        let wires = &mut self.inner.embedded;
+        leave_out(&mut wires.edges, edges);
+        leave_out(&mut wires.points, points);
+        if !self.inner.has_embedded() {
+            self.inner = self.inner.without_embedded();
+        }
+        self.keep_all(scratch)
     }
 
     /// Writes a copy of edges and points that have no files of their own to the store's folder. Errors: the disk.

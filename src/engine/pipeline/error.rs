@@ -64,12 +64,16 @@ pub enum PipelineError {
         n: u64,
     },
     /// An embedded edge or an embedded point lies in a region that is not filled.
-    #[error("{n} of the embedded {what} lie where nothing is filled, the first of {label:?}")]
+    #[error(
+        "{n} of the embedded {what} lie where nothing is filled; the first is {name}, {distance:.1e} from the surface"
+    )]
     WireOutside {
         /// The text "edges" or "points".
         what: &'static str,
-        /// Label of the first such edge or point.
-        label: String,
+        /// Name of the first: its label, and its number among those of that label.
+        name: String,
+        /// Distance of the first from the nearest triangle; of an edge, that of its nearer end.
+        distance: f64,
         /// Position of the first: the point, or the middle of the edge.
         at: Point,
         /// Number of such edges or points.

@@ -28,8 +28,9 @@ pub use error::PipelineError;
 pub use mesh::coarse_mesh;
 pub use mesh::{CoarseReport, HeadStart, Summary, head_start, mesh, mesh_prepared};
 pub use plan::{
-    Estimate, MEMORY_MIN, MeshOptions, Options, OptionsText, Plan, Prepared, RECIPE, RunOptions,
-    SizeFile, Subdomains, Trial, least_for, prepare, recipe_of, record_recipe,
+    EmbedOutside, Estimate, MEMORY_MIN, MeshOptions, Options, OptionsText, OuterEmbedded, Plan,
+    Prepared, RECIPE, RunOptions, SizeFile, Subdomains, Trial, least_for, outer_embedded, prepare,
+    recipe_of, record_recipe,
 };
 pub use progress::silent;
 pub use progress::{Event, Watcher};

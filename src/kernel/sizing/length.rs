@@ -55,9 +55,11 @@ impl Length {
         }
     }
 
+    /// Checks that the length is one.
+    ///
     /// # Errors
     /// [`SizingError::BadValue`] with the name of `option` for what is no number above zero.
-    pub(super) fn check(self, option: &'static str) -> Result<(), SizingError> {
+    pub fn check(self, option: &'static str) -> Result<(), SizingError> {
         let (Self::Units(x) | Self::Percent(x)) = self;
         if is_length(x) { Ok(()) } else { Err(bad_length(option, self.to_string())) }
     }

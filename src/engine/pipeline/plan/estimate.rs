@@ -7,7 +7,7 @@
 //! - the armadillo: 1.02 million tetrahedra on 52,000 triangles;
 //! - `balls,count=1000`: 4.04 million tetrahedra on 506,000 triangles.
 
-use super::regions::{refuse_outer_points, refuse_outer_sheets, region_sizes};
+use super::regions::{OuterEmbedded, refuse_outer_sheets, region_sizes};
 use super::subdomains::n_subdomains;
 use super::{MEMORY_MIN, Options, Plan};
 use crate::pipeline::error::PipelineError;
@@ -191,7 +191,7 @@ fn prepare_in(
     let _volumes = scratch.lease(OF_SIDE * surface.n_triangles());
     let chosen = chosen(&seeker, &volumes, options)?;
     refuse_outer_sheets(surface, &volumes, &chosen)?;
-    refuse_outer_points(surface, &seeker, &volumes, &chosen)?;
+    OuterEmbedded::find(surface, &seeker, &volumes, &chosen).refuse(surface, scratch)?;
     let filled: Vec<bool> = (0..volumes.n_volumes).map(|v| chosen.volumes.contains(&v)).collect();
     let domain = Domain { seeker: &seeker, volumes: &volumes, filled: &filled };
     let (field, mut sizes) = match early {
@@ -206,7 +206,7 @@ fn prepare_in(
 }
 
 /// Returns the filled volumes. Errors: a seed on a triangle, outside all volumes, in an empty region, or in conflict with another.
-fn chosen(
+pub(super) fn chosen(
     seeker: &Seeker,
     volumes: &EnclosedVolumes,
     options: &Options,

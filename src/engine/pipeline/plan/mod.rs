@@ -14,5 +14,6 @@ pub(super) mod subdomains;
 pub use estimate::{Estimate, Prepared, least_for, prepare};
 pub use memory::{MEMORY_MIN, Plan};
 pub use option_text::OptionsText;
-pub use options::{MeshOptions, Options, RunOptions, SizeFile, Subdomains, Trial};
+pub use options::{EmbedOutside, MeshOptions, Options, RunOptions, SizeFile, Subdomains, Trial};
 pub use recipe::{RECIPE, recipe_of, record_recipe};
+pub use regions::{OuterEmbedded, outer_embedded};

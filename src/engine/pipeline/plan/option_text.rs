@@ -9,7 +9,7 @@ use super::options::{MeshOptions, SizeFile, Subdomains};
 use crate::pipeline::error::PipelineError;
 use tetdb_base::surface::{Seed, SeedKind};
 use tetdb_kernel::boundary::{RegionPolicy, RegionRule};
-use tetdb_kernel::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
+use tetdb_kernel::sizing::{Formula, Length, RegionSize, SizeOptions, SizeSource, SizingError};
 use tetdb_schema::word::Word as _;
 
 /// Options as text, one key each. Lengths are numbers or shares of the box diagonal such as `1%`; shapes and seeds are numbers
@@ -78,6 +78,12 @@ pub struct OptionsText {
     /// See [`MeshOptions::refine_surface`].
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub refine_surface: bool,
+    /// See [`MeshOptions::snap_embedded`].
+    #[serde(deserialize_with = "text", skip_serializing_if = "Option::is_none")]
+    pub snap_embedded: Option<String>,
+    /// A word of [`EmbedOutside`](super::EmbedOutside).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub embed_outside: Option<String>,
 }
 
 impl OptionsText {
@@ -129,6 +135,8 @@ impl OptionsText {
             seal: other.seal.or(self.seal),
             keep_stages: other.keep_stages || self.keep_stages,
             refine_surface: other.refine_surface || self.refine_surface,
+            snap_embedded: other.snap_embedded.or(self.snap_embedded),
+            embed_outside: other.embed_outside.or(self.embed_outside),
         }
     }
 
@@ -209,6 +217,10 @@ impl TryFrom<OptionsText> for MeshOptions {
             seal: word("seal", &text.seal, Default::default())?,
             keep_stages: text.keep_stages,
             refine_surface: text.refine_surface,
+            snap_embedded: (text.snap_embedded.as_deref())
+                .map(|t| Length::parse("snap_embedded", t))
+                .transpose()?,
+            embed_outside: word("embed_outside", &text.embed_outside, Default::default())?,
         })
     }
 }
@@ -221,6 +233,7 @@ impl From<MeshOptions> for OptionsText {
             kept.map(Seed::to_string).collect()
         };
         let seal = Some(options.seal).filter(|&seal| seal != Default::default());
+        let outside = Some(options.embed_outside).filter(|&outside| outside != Default::default());
         Self {
             regions: rule.is_given.then(|| rule.policy.word().to_owned()),
             region_seed: seeds(false),
@@ -232,6 +245,8 @@ impl From<MeshOptions> for OptionsText {
             seal: seal.map(|seal| seal.word().to_owned()),
             keep_stages: options.keep_stages,
             refine_surface: options.refine_surface,
+            snap_embedded: options.snap_embedded.map(|length| length.to_string()),
+            embed_outside: outside.map(|outside| outside.word().to_owned()),
             ..Self::from_sizes(&options.sizes, options.size_field.as_ref())
         }
     }
@@ -371,6 +386,8 @@ mod tests {
             seal: some("none"),
             keep_stages: true,
             refine_surface: true,
+            snap_embedded: some("0.1%"),
+            embed_outside: some("skip"),
         }
     }
 

@@ -5,7 +5,8 @@ use crate::pipeline::work::RemoteWorkers;
 use tetdb_kernel::bisect::Method;
 use tetdb_kernel::boundary::RegionRule;
 use tetdb_kernel::optimize::Mode;
-use tetdb_kernel::sizing::SizeOptions;
+use tetdb_kernel::sizing::{Length, SizeOptions};
+use tetdb_schema::word::Word;
 use tetdb_store::sealed::Form;
 
 /// Fewest tetrahedra of a planned sub-domain; a smaller one would be almost entirely refined zone.
@@ -41,6 +42,25 @@ pub struct MeshOptions {
     pub keep_stages: bool,
     /// True to first divide the surface's triangles to the wanted lengths. The store keeps the divided surface.
     pub refine_surface: bool,
+    /// Distance within which embedded points and ends of embedded edges were moved onto the surface. The record of what was asked
+    /// for: the store keeps the surface with the moved points.
+    pub snap_embedded: Option<Length>,
+    /// Treatment of embedded edges and points outside the filled regions. The store keeps a surface without them.
+    pub embed_outside: EmbedOutside,
+}
+
+/// Treatment of embedded edges and points outside all filled regions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EmbedOutside {
+    /// They are refused with the place of the first.
+    #[default]
+    Error,
+    /// They are left out, and a note counts them.
+    Skip,
+}
+
+impl Word for EmbedOutside {
+    const WORDS: &'static [(Self, &'static str)] = &[(Self::Error, "error"), (Self::Skip, "skip")];
 }
 
 /// A file of wanted edge lengths at the vertices of a mesh.

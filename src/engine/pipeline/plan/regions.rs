@@ -1,8 +1,10 @@
 //! Sizes of regions, given by number, by name or by a label of the triangles around them; and checks that no sheet, embedded edge
 //! or embedded point lies outside the filled regions.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
+use super::Options;
+use super::estimate::chosen;
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface};
@@ -79,27 +81,18 @@ fn unknown(which: &str, surface: &Surface, n_regions: usize) -> SizingError {
     }
 }
 
-/// Checks that every sheet and embedded edge is inside. Errors: one lies where nothing is filled.
+/// Checks that every sheet is inside. Errors: one lies where nothing is filled.
 pub(super) fn refuse_outer_sheets(
     surface: &Surface,
     volumes: &EnclosedVolumes,
     chosen: &Filled,
 ) -> Result<(), PipelineError> {
-    let is_outer =
-        |&t: &u32| surface.is_sheet(t) && !chosen.volumes.contains(&volumes.of_side[t as usize][0]);
-    let mut outer = (0..surface.n_triangles() as u32).filter(is_outer);
+    let is_outer = |&t: &u32| surface.is_sheet(t) && is_outer(t, volumes, chosen);
+    let mut outer = (0..surface.n_input_triangles() as u32).filter(is_outer);
     let Some(triangle) = outer.next() else {
         return Ok(());
     };
     let [a, b, c] = surface.corners(triangle);
-    if surface.is_support_triangle(triangle) {
-        return Err(PipelineError::WireOutside {
-            what: "edges",
-            label: surface.label_name(triangle).to_owned(),
-            at: a.midpoint(b),
-            n: 1 + outer.count() as u64,
-        });
-    }
     Err(PipelineError::SheetOutside {
         triangle,
         label: surface.label_name(triangle).to_owned(),
@@ -108,25 +101,90 @@ pub(super) fn refuse_outer_sheets(
     })
 }
 
-/// Checks that every embedded point is inside. Errors: one lies where nothing is filled.
-pub(super) fn refuse_outer_points(
+/// Returns whether the front of a triangle is where nothing is filled.
+fn is_outer(t: u32, volumes: &EnclosedVolumes, chosen: &Filled) -> bool {
+    !chosen.volumes.contains(&volumes.of_side[t as usize][0])
+}
+
+/// Embedded edges and points outside all filled regions, by their numbers in the surface.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OuterEmbedded {
+    /// Numbers of edges.
+    pub edges: Vec<usize>,
+    /// Numbers of points.
+    pub points: Vec<usize>,
+}
+
+impl OuterEmbedded {
+    pub(super) fn find(
+        surface: &Surface,
+        seeker: &Seeker,
+        volumes: &EnclosedVolumes,
+        chosen: &Filled,
+    ) -> Self {
+        let first = surface.n_input_triangles() as u32;
+        let supports = first..surface.n_triangles() as u32;
+        let supports = supports.filter(|&t| is_outer(t, volumes, chosen));
+        // A support triangle begins with the ends of its edge.
+        let ends = |t: u32| surface.triangles[t as usize];
+        let outer: HashSet<[u32; 2]> = supports.map(|t| [ends(t)[0], ends(t)[1]]).collect();
+        let wires = &surface.embedded;
+        let mut found = Self::default();
+        let is_outer = |&(_, &[a, b, _]): &(usize, &[u32; 3])| outer.contains(&[a, b]);
+        let edges = wires.edges.iter().enumerate().filter(is_outer);
+        found.edges.extend(edges.map(|(e, _)| e));
+        let mut ends: HashSet<u32> = outer.into_iter().flatten().collect();
+        if !ends.is_empty() {
+            let used = surface.triangles[..first as usize].iter().flatten();
+            used.for_each(|v| _ = ends.remove(v));
+        }
+        for (i, (&[v, _], &size)) in wires.points.iter().zip(&wires.sizes).enumerate() {
+            let at = || volumes.at(seeker, surface.points[v as usize]);
+            if ends.contains(&v) || size > 0.0 && !chosen.volumes.contains(&at()) {
+                found.points.push(i);
+            }
+        }
+        found
+    }
+
+    /// Returns whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.edges.is_empty() && self.points.is_empty()
+    }
+
+    /// The error that names the first of them, if there are any.
+    pub(super) fn refuse(
+        &self,
+        surface: &Surface,
+        scratch: &ScratchSpace,
+    ) -> Result<(), PipelineError> {
+        let (what, n, name, ends) = match (&self.edges[..], &self.points[..]) {
+            ([e, ..], _) => {
+                let [a, b, _] = surface.embedded.edges[*e];
+                ("edges", self.edges.len(), surface.edge_name(*e), [a, b])
+            }
+            (_, [p, ..]) => {
+                let [v, _] = surface.embedded.points[*p];
+                ("points", self.points.len(), surface.point_name(*p), [v, v])
+            }
+            _ => return Ok(()),
+        };
+        let ends = ends.map(|v| surface.points[v as usize]);
+        let plain = Seeker::with_filter(surface, scratch, |t| !surface.is_support_triangle(t));
+        let [a, b] = ends.map(|p| plain.distance(p, f64::INFINITY));
+        let (n, at, distance) = (n as u64, ends[0].midpoint(ends[1]), a.min(b));
+        Err(PipelineError::WireOutside { what, name, distance, at, n })
+    }
+}
+
+/// Finds embedded edges and points outside the regions that `options` fill. Errors: seeds that fit no region.
+pub fn outer_embedded(
     surface: &Surface,
-    seeker: &Seeker,
-    volumes: &EnclosedVolumes,
-    chosen: &Filled,
-) -> Result<(), PipelineError> {
-    let wires = &surface.embedded;
-    let alone = (wires.points.iter().zip(&wires.sizes)).filter(|(_, size)| **size > 0.0);
-    let is_outer =
-        |&v: &u32| !(chosen.volumes).contains(&volumes.at(seeker, surface.points[v as usize]));
-    let mut outer = alone.map(|(&[v, label], _)| (v, label)).filter(|(v, _)| is_outer(v));
-    let Some((v, label)) = outer.next() else {
-        return Ok(());
-    };
-    Err(PipelineError::WireOutside {
-        what: "points",
-        label: surface.label_names[label as usize].clone(),
-        at: surface.points[v as usize],
-        n: 1 + outer.count() as u64,
-    })
+    options: &Options,
+    scratch: &ScratchSpace,
+) -> Result<OuterEmbedded, PipelineError> {
+    let seeker = Seeker::with_filter(surface, scratch, |_| true);
+    let volumes = EnclosedVolumes::new_in(&seeker, scratch);
+    let chosen = chosen(&seeker, &volumes, options)?;
+    Ok(OuterEmbedded::find(surface, &seeker, &volumes, &chosen))
 }

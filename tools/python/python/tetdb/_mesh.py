@@ -75,7 +75,7 @@ def mesh(
     embed_edges, embed_points : dict, optional
         Edges and points inside, by name: files or arrays, see :meth:`Surface.embedded_edges` and :meth:`Surface.embedded_points`.
     refine_surface : bool
-        Whether the surface's triangles are divided first where embedded points lie exactly on them, and until their edges are as short as
+        Whether the surface's triangles are divided first where embedded points lie on them, and until their edges are as short as
         the wanted lengths; no point moves.
     optimize : {"full", "delaunay", "none"}
         How far tetrahedra are improved.
