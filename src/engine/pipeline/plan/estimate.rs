@@ -7,22 +7,19 @@
 //! - the armadillo: 1.02 million tetrahedra on 52,000 triangles;
 //! - `balls,count=1000`: 4.04 million tetrahedra on 506,000 triangles.
 
-use super::regions::{OuterEmbedded, refuse_outer_sheets, region_sizes};
+use super::regions::{OuterEmbedded, chosen, refuse_outer_sheets, region_sizes};
 use super::subdomains::n_subdomains;
 use super::{MEMORY_MIN, Options, Plan};
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::{ScratchSpace, attempt, join};
-use tetdb_base::surface::{EnclosedVolumes, OUTSIDE, Seeker, Surface, VOLUMES_TRIANGLE};
-use tetdb_kernel::boundary::{BoundaryError, Filled, RegionPolicy};
+use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface, VOLUMES_TRIANGLE};
+use tetdb_kernel::boundary::{Filled, RegionPolicy};
 use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::{
     Background, Domain, ExtraSizes, Region, SizeConstraint, SizeField, SizeSummary, TetCounts,
 };
 use tetdb_store::sealed::Form;
 
-/// Share of the box diagonal below which a seed counts as on the surface. The side of a seed comes from sums of doubles, with an
-/// error of some 1e-16 of the diagonal, and a thousand times more where triangles are steep.
-const ON_SURFACE: f64 = 1e-12;
 /// Bytes held per triangle once volumes are identified: the volume on each of its two sides.
 const OF_SIDE: usize = size_of::<[u32; 2]>();
 /// Bytes held per vertex while sizes are computed: its size and slope, and lists of the vertices near a cell and of as many
@@ -203,29 +200,6 @@ fn prepare_in(
     }
     let estimate = Estimate::of(&domain, options, &field)?;
     Ok(Prepared { field, sizes, estimate, notes: notes(&chosen, options, volumes.n_volumes - 1) })
-}
-
-/// Returns the filled volumes. Errors: a seed on a triangle, outside all volumes, in an empty region, or in conflict with another.
-pub(super) fn chosen(
-    seeker: &Seeker,
-    volumes: &EnclosedVolumes,
-    options: &Options,
-) -> Result<Filled, PipelineError> {
-    let rule = &options.mesh.regions;
-    let reach = ON_SURFACE * seeker.surface().bounds().diagonal();
-    for seed in &rule.seeds {
-        if seeker.distance(seed.point, reach).is_finite() {
-            return Err(PipelineError::Boundary(BoundaryError::Seed {
-                message: format!(
-                    "the seed {seed} lies on a triangle: a seed lies inside its region"
-                ),
-                point: seed.point,
-            }));
-        }
-    }
-    let (end, walls) = (volumes.n_volumes, volumes.walls());
-    let chosen = rule.policy.filled(OUTSIDE, end, &walls)?;
-    Ok(rule.apply(chosen, OUTSIDE, end, |p| volumes.at(seeker, p))?)
 }
 
 /// Notes on seeds: the number of unnamed regions if some have names, and how many of the `n` volumes stay empty under a rule by

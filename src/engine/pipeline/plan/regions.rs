@@ -4,12 +4,15 @@
 use std::collections::{BTreeMap, HashSet};
 
 use super::Options;
-use super::estimate::chosen;
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::ScratchSpace;
-use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface};
-use tetdb_kernel::boundary::Filled;
+use tetdb_base::surface::{EnclosedVolumes, OUTSIDE, Seeker, Surface};
+use tetdb_kernel::boundary::{BoundaryError, Filled};
 use tetdb_kernel::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError};
+
+/// Share of the box diagonal below which a seed counts as on the surface. The side of a seed comes from sums of doubles, with an
+/// error of some 1e-16 of the diagonal, and a thousand times more where triangles are steep.
+const ON_SURFACE: f64 = 1e-12;
 
 /// Returns the region sizes of `sizes` for `domain`; `names` gives the names of its volumes.
 ///
@@ -79,6 +82,29 @@ fn unknown(which: &str, surface: &Surface, n_regions: usize) -> SizingError {
             "no filled region has this number or name, and no label of this name encloses one; there are regions 1 to {n_regions}, and labels {list}"
         ),
     }
+}
+
+/// Returns the filled volumes. Errors: a seed on a triangle, outside all volumes, in an empty region, or in conflict with another.
+pub(super) fn chosen(
+    seeker: &Seeker,
+    volumes: &EnclosedVolumes,
+    options: &Options,
+) -> Result<Filled, PipelineError> {
+    let rule = &options.mesh.regions;
+    let reach = ON_SURFACE * seeker.surface().bounds().diagonal();
+    for seed in &rule.seeds {
+        if seeker.distance(seed.point, reach).is_finite() {
+            return Err(PipelineError::Boundary(BoundaryError::Seed {
+                message: format!(
+                    "the seed {seed} lies on a triangle: a seed lies inside its region"
+                ),
+                point: seed.point,
+            }));
+        }
+    }
+    let (end, walls) = (volumes.n_volumes, volumes.walls());
+    let chosen = rule.policy.filled(OUTSIDE, end, &walls)?;
+    Ok(rule.apply(chosen, OUTSIDE, end, |p| volumes.at(seeker, p))?)
 }
 
 /// Checks that every sheet is inside. Errors: one lies where nothing is filled.
