@@ -90,7 +90,7 @@ pub fn mesh(
     }
 }
 
-/// Like [`mesh`], for a new store, with the results of [`prepare`] and [`ahead`] for this surface and these options.
+/// Like [`mesh`], for a new store, with the results of [`prepare`] and [`head_start`] for this surface and these options.
 ///
 /// An owned surface is dropped once the coarse mesh exists, which frees its memory for the following steps. Errors: as [`mesh`].
 pub fn mesh_prepared(
