@@ -6,7 +6,7 @@ pub use tetdb_engine::api::peak_bytes as peak;
 pub(super) use tetdb_engine::api::show_bytes as show;
 use tetdb_engine::api::{MEMORY_LEAST, default_cap};
 
-/// The cap in bytes: the requested one, or a share of the free memory. Errors: as [`asked`].
+/// The cap in bytes: the requested one, or a share of the free memory. Errors: as [`requested`].
 pub fn cap(option: Option<&str>) -> Result<u64, Failure> {
     Ok(requested(option)?.unwrap_or_else(|| default_cap().0))
 }
