@@ -1,44 +1,46 @@
-//! Faces and nodes of files of finite elements: Abaqus `.inp`, Nastran `.nas` and `.bdf`, I-DEAS `.unv`.
+//! Faces and nodes of files of finite elements: Abaqus `.inp`, Nastran `.nas` and `.bdf`. I-DEAS is in `unv`.
 //!
 //! Each reads shells, membranes and flat elements as faces; curved ones by their corners. Solid elements name regions, beams are left
 //! out with a note. What would move nodes, such as other coordinate systems, is refused.
 
-use std::collections::{BTreeSet, HashMap};
 use std::io::BufRead;
 
-use super::feed::{Feed, Result, name, parse, quote};
+use super::feed::{Feed, Result, parse, quote};
 use super::gmsh_numbers::NodeTags;
 use super::solids::Solids;
 use super::{FilePlace, ReadError, ReadFault, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
 
+/// A line of a file and its place.
+pub(super) type Row = (String, FilePlace);
+
 /// A file being read.
-struct Elements<'a, 'b> {
-    target: &'a mut SurfaceSink<'b>,
-    nodes: NodeTags,
+pub(super) struct Elements<'a, 'b> {
+    pub(super) target: &'a mut SurfaceSink<'b>,
+    pub(super) nodes: NodeTags,
     /// Solid elements to come: nodes, name, place.
-    late_solids: Vec<(Vec<i64>, String, FilePlace)>,
+    pub(super) late_solids: Vec<(Vec<i64>, String, FilePlace)>,
     /// Vertices of the file before the nodes of this part.
-    first: u32,
-    solids: Solids,
-    n_thin: u64,
-    n_curved: u64,
+    pub(super) first: u32,
+    pub(super) solids: Solids,
+    pub(super) n_thin: u64,
+    pub(super) n_curved: u64,
     /// Faces to come with the place that names them, for files with elements before nodes or groups.
-    faces: Vec<(i64, Vec<i64>, String, FilePlace)>,
+    pub(super) faces: Vec<(i64, Vec<i64>, String, FilePlace)>,
 }
 
-fn unexpected(place: &FilePlace, expected: &str, found: impl AsRef<[u8]>) -> ReadError {
+pub(super) fn unexpected(place: &FilePlace, expected: &str, found: impl AsRef<[u8]>) -> ReadError {
     let (expected, found) = (expected.to_owned(), quote(found.as_ref()));
     place.refuse(ReadFault::Unexpected { expected, found })
 }
 
-fn unsupported(place: &FilePlace, what: impl Into<String>) -> ReadError {
+pub(super) fn unsupported(place: &FilePlace, what: impl Into<String>) -> ReadError {
     place.refuse(ReadFault::Unsupported(what.into()))
 }
 
 impl<'a, 'b> Elements<'a, 'b> {
-    fn new(target: &'a mut SurfaceSink<'b>) -> Self {
+    pub(super) fn new(target: &'a mut SurfaceSink<'b>) -> Self {
         Self {
             target,
             nodes: NodeTags::default(),
@@ -51,7 +53,7 @@ impl<'a, 'b> Elements<'a, 'b> {
         }
     }
 
-    fn node(&mut self, tag: i64, xyz: [f64; 3], place: &FilePlace) -> Result<()> {
+    pub(super) fn node(&mut self, tag: i64, xyz: [f64; 3], place: &FilePlace) -> Result<()> {
         if !self.nodes.push(tag) {
             return Err(unexpected(place, "nodes of different numbers", tag.to_string()));
         }
@@ -61,7 +63,7 @@ impl<'a, 'b> Elements<'a, 'b> {
         added.map_err(|source| place.refuse(ReadFault::Surface(source)))
     }
 
-    fn corners(&self, tags: &[i64], place: &FilePlace) -> Result<Vec<u32>> {
+    pub(super) fn corners(&self, tags: &[i64], place: &FilePlace) -> Result<Vec<u32>> {
         let find = |&tag: &i64| {
             let known = self.nodes.get(tag).map(|v| v + self.first);
             known.ok_or_else(|| unexpected(place, "the number of a node", tag.to_string()))
@@ -70,13 +72,20 @@ impl<'a, 'b> Elements<'a, 'b> {
     }
 
     /// Keeps a face until all nodes are known.
-    fn face(&mut self, id: i64, tags: &[i64], n_nodes: usize, label: String, place: &FilePlace) {
+    pub(super) fn face(
+        &mut self,
+        id: i64,
+        tags: &[i64],
+        n_nodes: usize,
+        label: String,
+        place: &FilePlace,
+    ) {
         self.n_curved += u64::from(n_nodes > tags.len());
         self.faces.push((id, tags.to_vec(), label, place.clone()));
     }
 
     /// Adds the faces and solid elements kept so far; `label_of` may replace the label of an element.
-    fn take_faces(&mut self, label_of: impl Fn(i64) -> Option<String>) -> Result<()> {
+    pub(super) fn take_faces(&mut self, label_of: impl Fn(i64) -> Option<String>) -> Result<()> {
         for (id, tags, label, place) in std::mem::take(&mut self.faces) {
             let corners = self.corners(&tags, &place)?;
             let label = self.target.label(&label_of(id).unwrap_or(label));
@@ -89,14 +98,14 @@ impl<'a, 'b> Elements<'a, 'b> {
         Ok(())
     }
 
-    fn solid(&mut self, tags: &[i64], name: &str, place: &FilePlace) -> Result<()> {
+    pub(super) fn solid(&mut self, tags: &[i64], name: &str, place: &FilePlace) -> Result<()> {
         let corners = self.corners(tags, place)?;
         let added = self.solids.add(&corners, name, self.target);
         added.map_err(|source| place.refuse(ReadFault::Surface(source)))
     }
 
     /// An element of Abaqus: its number and its nodes.
-    fn abaqus_element(
+    pub(super) fn abaqus_element(
         &mut self,
         text: &str,
         kind: &str,
@@ -136,7 +145,7 @@ impl<'a, 'b> Elements<'a, 'b> {
         Ok(())
     }
 
-    fn finish<R: BufRead>(self, feed: &Feed<R>) -> Result<()> {
+    pub(super) fn finish<R: BufRead>(self, feed: &Feed<R>) -> Result<()> {
         if self.n_thin > 0 {
             let what = "beams and points";
             self.target.builder.note(NoteKind::SkippedElements { what, n: self.n_thin });
@@ -150,7 +159,7 @@ impl<'a, 'b> Elements<'a, 'b> {
 }
 
 /// A real number, also with `d` for the exponent or, in Nastran, with nothing between.
-fn real(text: &str, place: &FilePlace) -> Result<f64> {
+pub(super) fn real(text: &str, place: &FilePlace) -> Result<f64> {
     let text = text.trim().to_ascii_lowercase().replace('d', "e");
     let signed = text.rfind(['+', '-']).filter(|&k| k > 0 && !text[..k].ends_with('e'));
     let number = match signed {
@@ -161,13 +170,16 @@ fn real(text: &str, place: &FilePlace) -> Result<f64> {
     number.ok_or_else(|| super::feed::not_a_number(place, "a coordinate", text.as_bytes()))
 }
 
-fn integer(text: &str, place: &FilePlace) -> Result<i64> {
+pub(super) fn integer(text: &str, place: &FilePlace) -> Result<i64> {
     let number = parse(text.trim().as_bytes());
     number.ok_or_else(|| unexpected(place, "a whole number", text))
 }
 
 /// The next line that is no comment, and its place.
-fn line<R: BufRead>(feed: &mut Feed<R>, comment: &str) -> Result<Option<(String, FilePlace)>> {
+pub(super) fn line<R: BufRead>(
+    feed: &mut Feed<R>,
+    comment: &str,
+) -> Result<Option<(String, FilePlace)>> {
     let mut bytes = Vec::new();
     loop {
         let place = feed.place();
@@ -378,155 +390,4 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
     }
     mesh.take_faces(|_| None)?;
     mesh.finish(&feed)
-}
-
-/// Reads a universal file of I-DEAS: nodes (2411, 781), elements (2412) and groups of elements, which are labels.
-pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
-    let mut mesh = Elements::new(target);
-    let mut groups: HashMap<i64, String> = HashMap::new();
-    let mut other_groups = BTreeSet::new();
-    let mut solids = Vec::new();
-    while let Some((mark, place)) = line(&mut feed, "\0")? {
-        if mark.trim() != "-1" {
-            return Err(unexpected(&place, "-1 before a data set", mark));
-        }
-        let Some((kind, _)) = line(&mut feed, "\0")? else {
-            break;
-        };
-        let mut rows = Vec::new();
-        loop {
-            match line(&mut feed, "\0")? {
-                Some((text, _)) if text.trim() == "-1" => break,
-                Some(row) => rows.push(row),
-                None => return Err(feed.truncated("-1 behind a data set")),
-            }
-        }
-        let mut rows = rows.into_iter();
-        match kind.trim() {
-            "2411" | "781" => {
-                while let (Some((head, place)), Some((xyz, second))) = (rows.next(), rows.next()) {
-                    let tag = numbers(&head, &place)?.first().copied().unwrap_or(0);
-                    let xyz = xyz
-                        .split_whitespace()
-                        .map(|w| real(w, &second))
-                        .collect::<Result<Vec<f64>>>()?;
-                    let xyz = xyz
-                        .try_into()
-                        .map_err(|_| unexpected(&second, "three coordinates", "others"))?;
-                    mesh.node(tag, xyz, &place)?;
-                }
-            }
-            "2412" => {
-                unv_elements(&mut mesh, rows, &mut solids)?;
-            }
-            "2467" | "2477" | "2452" | "2435" | "2432" | "2430" | "2429" => {
-                // Kind and number of an entity; later versions have two more words.
-                let each = if ["2432", "2430", "2429"].contains(&kind.trim()) { 2 } else { 4 };
-                while let (Some((head, place)), Some((title, _))) = (rows.next(), rows.next()) {
-                    let n = numbers(&head, &place)?.last().copied().unwrap_or(0);
-                    let mut words = Vec::new();
-                    while (words.len() as i64) < n.saturating_mul(each) {
-                        let Some((row, place)) = rows.next() else {
-                            let expected = format!("{n} entities of the group");
-                            return Err(unexpected(&place, &expected, "the end of the data set"));
-                        };
-                        words.extend(numbers(&row, &place)?);
-                    }
-                    let title = name(title.as_bytes());
-                    // Kind 8 is an element.
-                    for entry in words.chunks_exact(each as usize).filter(|entry| entry[0] == 8) {
-                        let first = groups.entry(entry[1]).or_insert_with(|| title.clone());
-                        if *first != title {
-                            other_groups.insert(title.clone());
-                        }
-                    }
-                }
-            }
-            kind @ ("15" | "71" | "780" | "2417") => {
-                return Err(unsupported(&place, format!("the old data set {kind}")));
-            }
-            "2420" => {
-                // Coordinate systems: only one whose matrix is that of the global axes leaves nodes in place.
-                let rows: Vec<_> = rows.collect();
-                let values = rows.iter().skip(3).flat_map(|(text, _)| text.split_whitespace());
-                let axes: Vec<f64> = values
-                    .take(12)
-                    .filter_map(|w| w.to_ascii_lowercase().replace('d', "e").parse().ok())
-                    .collect();
-                let is_global = axes
-                    .iter()
-                    .enumerate()
-                    .all(|(k, x)| *x == f64::from(u8::from(k < 9 && k % 4 == 0)));
-                if !is_global {
-                    return Err(unsupported(&place, "a coordinate system of its own (2420)"));
-                }
-            }
-            _ => {}
-        }
-    }
-    mesh.take_faces(|id| groups.get(&id).cloned())?;
-    if !other_groups.is_empty() {
-        let names = Vec::from_iter(other_groups).join(", ");
-        mesh.target.builder.note(NoteKind::OtherGroups { names });
-    }
-    for (id, tags, place) in solids {
-        mesh.solid(&tags, groups.get(&id).map_or("", String::as_str), &place)?;
-    }
-    mesh.finish(&feed)
-}
-
-fn numbers(text: &str, place: &FilePlace) -> Result<Vec<i64>> {
-    text.split_whitespace().map(|w| integer(w, place)).collect()
-}
-
-/// A line of a file and its place.
-type Row = (String, FilePlace);
-
-/// The elements of data set 2412; solid ones go to `solids`.
-fn unv_elements(
-    mesh: &mut Elements,
-    rows: impl Iterator<Item = Row>,
-    solids: &mut Vec<(i64, Vec<i64>, FilePlace)>,
-) -> Result<()> {
-    let mut rows = rows.peekable();
-    while let Some((head, place)) = rows.next() {
-        let [id, kind, .., n] = numbers(&head, &place)?[..] else {
-            return Err(unexpected(&place, "the head of an element", head));
-        };
-        // Beams have a line of three numbers for their orientation, rods in some files.
-        let is_rod = kind == 11 && n == 2;
-        let has_three = |(row, _): &Row| row.split_whitespace().count() == 3;
-        if matches!(kind, 21..=24) || is_rod && rows.peek().is_some_and(has_three) {
-            rows.next();
-        }
-        let mut tags = Vec::new();
-        while (tags.len() as i64) < n {
-            let Some((row, place)) = rows.next() else {
-                return Err(unexpected(
-                    &place,
-                    "the nodes of the element",
-                    "the end of the data set",
-                ));
-            };
-            tags.extend(numbers(&row, &place)?);
-        }
-        // The nodes of a curved face run around it: every second one is a corner.
-        let corners = |step: usize| tags.iter().copied().step_by(step).collect::<Vec<i64>>();
-        match (kind, tags.len()) {
-            (41 | 51 | 61 | 71 | 74 | 81 | 91, 3) | (44 | 54 | 64 | 84 | 94, 4) => {
-                mesh.face(id, &tags, tags.len(), String::new(), &place);
-            }
-            (42 | 52 | 62 | 72 | 82 | 92, 6) | (45 | 55 | 65 | 75 | 85 | 95, 8) => {
-                mesh.face(id, &corners(2), tags.len(), String::new(), &place);
-            }
-            (111, 4) | (112, 6) | (115, 8) => solids.push((id, tags, place)),
-            (118, 10) => solids.push((id, vec![tags[0], tags[2], tags[4], tags[9]], place)),
-            (11 | 21..=24 | 31 | 32 | 121..=171, _) => mesh.n_thin += 1,
-            _ => {
-                let what = format!("element type {kind} of {} nodes", tags.len());
-                return Err(unsupported(&place, what));
-            }
-        }
-    }
-    Ok(())
 }

@@ -28,6 +28,7 @@ mod sizes;
 mod solids;
 mod stl;
 mod tetgen;
+mod unv;
 mod volume_cells;
 mod vtk;
 mod vtk_xml;
@@ -294,7 +295,7 @@ fn read_feed<R: BufRead>(
         Format::Vtk => vtk::read_surface(feed, target),
         Format::Abaqus => fem::read_abaqus(feed, target),
         Format::Nastran => fem::read_nastran(feed, target),
-        Format::Unv => fem::read_unv(feed, target),
+        Format::Unv => unv::read_unv(feed, target),
         Format::VtkXml => vtk_xml::read(feed, limit, target),
         Format::TetgenPoly => tetgen::read(feed, tetgen::FacetLayout::Poly, nodes, limit, target),
     }
