@@ -11,8 +11,7 @@ use tetdb_base::surface::NoteKind;
 /// Reads a universal file of I-DEAS: nodes (2411, 781), elements (2412) and groups of elements, which are labels.
 pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut mesh = Elements::new(target);
-    let mut groups: HashMap<i64, String> = HashMap::new();
-    let mut other_groups = BTreeSet::new();
+    let mut groups = Groups::default();
     let mut solids = Vec::new();
     while let Some((mark, place)) = line(&mut feed, "\0")? {
         if mark.trim() != "-1" {
@@ -48,59 +47,76 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
                 unv_elements(&mut mesh, rows, &mut solids)?;
             }
             "2467" | "2477" | "2452" | "2435" | "2432" | "2430" | "2429" => {
-                // Kind and number of an entity; later versions have two more words.
-                let each = if ["2432", "2430", "2429"].contains(&kind.trim()) { 2 } else { 4 };
-                while let (Some((head, place)), Some((title, _))) = (rows.next(), rows.next()) {
-                    let n = numbers(&head, &place)?.last().copied().unwrap_or(0);
-                    let mut words = Vec::new();
-                    while (words.len() as i64) < n.saturating_mul(each) {
-                        let Some((row, place)) = rows.next() else {
-                            let expected = format!("{n} entities of the group");
-                            return Err(unexpected(&place, &expected, "the end of the data set"));
-                        };
-                        words.extend(numbers(&row, &place)?);
-                    }
-                    let title = name(title.as_bytes());
-                    // Kind 8 is an element.
-                    for entry in words.chunks_exact(each as usize).filter(|entry| entry[0] == 8) {
-                        let first = groups.entry(entry[1]).or_insert_with(|| title.clone());
-                        if *first != title {
-                            other_groups.insert(title.clone());
-                        }
-                    }
-                }
+                groups.read(kind.trim(), rows)?;
             }
             kind @ ("15" | "71" | "780" | "2417") => {
                 return Err(unsupported(&place, format!("the old data set {kind}")));
             }
             "2420" => {
-                // Coordinate systems: only one whose matrix is that of the global axes leaves nodes in place.
-                let rows: Vec<_> = rows.collect();
-                let values = rows.iter().skip(3).flat_map(|(text, _)| text.split_whitespace());
-                let axes: Vec<f64> = values
-                    .take(12)
-                    .filter_map(|w| w.to_ascii_lowercase().replace('d', "e").parse().ok())
-                    .collect();
-                let is_global = axes
-                    .iter()
-                    .enumerate()
-                    .all(|(k, x)| *x == f64::from(u8::from(k < 9 && k % 4 == 0)));
-                if !is_global {
+                if !are_global_axes(rows) {
                     return Err(unsupported(&place, "a coordinate system of its own (2420)"));
                 }
             }
             _ => {}
         }
     }
-    mesh.take_faces(|id| groups.get(&id).cloned())?;
-    if !other_groups.is_empty() {
-        let names = Vec::from_iter(other_groups).join(", ");
+    mesh.take_faces(|id| groups.names.get(&id).cloned())?;
+    if !groups.others.is_empty() {
+        let names = Vec::from_iter(groups.others).join(", ");
         mesh.target.builder.note(NoteKind::OtherGroups { names });
     }
     for (id, tags, place) in solids {
-        mesh.solid(&tags, groups.get(&id).map_or("", String::as_str), &place)?;
+        mesh.solid(&tags, groups.names.get(&id).map_or("", String::as_str), &place)?;
     }
     mesh.finish(&feed)
+}
+
+/// Groups of elements.
+#[derive(Default)]
+struct Groups {
+    /// By element, the first group that has it.
+    names: HashMap<i64, String>,
+    /// Groups with elements of another group before.
+    others: BTreeSet<String>,
+}
+
+impl Groups {
+    /// Reads a data set of groups: kind and number of an entity, and in later kinds of data sets two more words.
+    fn read(&mut self, kind: &str, mut rows: impl Iterator<Item = Row>) -> Result<()> {
+        let each = if ["2432", "2430", "2429"].contains(&kind) { 2 } else { 4 };
+        while let (Some((head, place)), Some((title, _))) = (rows.next(), rows.next()) {
+            let n = numbers(&head, &place)?.last().copied().unwrap_or(0);
+            let mut words = Vec::new();
+            while (words.len() as i64) < n.saturating_mul(each) {
+                let Some((row, place)) = rows.next() else {
+                    let expected = format!("{n} entities of the group");
+                    return Err(unexpected(&place, &expected, "the end of the data set"));
+                };
+                words.extend(numbers(&row, &place)?);
+            }
+            let title = name(title.as_bytes());
+            // Kind 8 is an element.
+            for entry in words.chunks_exact(each as usize).filter(|entry| entry[0] == 8) {
+                let first = self.names.entry(entry[1]).or_insert_with(|| title.clone());
+                if *first != title {
+                    self.others.insert(title.clone());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns whether the matrix of a coordinate system is that of the global axes, which leaves nodes in place.
+fn are_global_axes(rows: impl Iterator<Item = Row>) -> bool {
+    let words: Vec<String> = rows
+        .skip(3)
+        .flat_map(|(text, _)| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+        .collect();
+    let axes: Vec<f64> = (words.iter().take(12))
+        .filter_map(|w| w.to_ascii_lowercase().replace('d', "e").parse().ok())
+        .collect();
+    axes.iter().enumerate().all(|(k, x)| *x == f64::from(u8::from(k < 9 && k % 4 == 0)))
 }
 
 fn numbers(text: &str, place: &FilePlace) -> Result<Vec<i64>> {
