@@ -52,10 +52,8 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
             kind @ ("15" | "71" | "780" | "2417") => {
                 return Err(unsupported(&place, format!("the old data set {kind}")));
             }
-            "2420" => {
-                if !are_global_axes(rows) {
-                    return Err(unsupported(&place, "a coordinate system of its own (2420)"));
-                }
+            "2420" if !are_global_axes(rows) => {
+                return Err(unsupported(&place, "a coordinate system of its own (2420)"));
             }
             _ => {}
         }
