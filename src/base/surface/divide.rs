@@ -28,7 +28,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// edges. With 1 they leave the nearest place by as much as they were moved to it.
 const FEATURE_SHARE: f64 = 0.25;
 
-/// What [`Surface::divide_at`] did.
+/// Counts of [`Surface::divide_at`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Divided {
     /// Vertices that divided triangles.
@@ -159,11 +159,11 @@ impl Surface {
 
 /// Distances within which a vertex is on, or moved onto, a part of the surface.
 struct Reach {
-    /// What counts as rounding.
+    /// Greatest distance of a vertex that lies on a part but for rounding, in input units.
     rounding: f64,
-    /// More than pieces leave the box of their triangle by rounding.
+    /// Margin of boxes: rounding takes pieces out of their triangle's box by less.
     slack: f64,
-    /// What counts as near.
+    /// Distance below which vertices are moved onto a part, in input units.
     within: f64,
     /// From the nearest place to a vertex or an edge that is taken instead.
     feature: f64,

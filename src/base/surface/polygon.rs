@@ -72,7 +72,7 @@ impl Plane {
         Coord { x: p[self.axes[0]] * self.scale, y: p[self.axes[1]] * self.scale }
     }
 
-    /// Whether the triangles from the first corner all run like the polygon and go round it less than once.
+    /// Returns whether all triangles from the first corner run like the polygon, in less than one full turn around that corner.
     fn is_fan(&self, corners: &[Point]) -> bool {
         let sign = if self.is_clockwise { -1.0 } else { 1.0 };
         let at = |k: usize| self.coord(corners[k]);

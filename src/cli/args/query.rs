@@ -94,7 +94,7 @@ pub struct QueryArgs {
 }
 
 impl QueryArgs {
-    /// Whether anything says which tetrahedra are meant.
+    /// Returns whether any argument restricts the tetrahedra that are answered.
     pub fn has_condition(&self) -> bool {
         let lists = [&self.boxes, &self.sphere, &self.plane];
         let places = [&self.subdomain, &self.region, &self.label, &self.interface, &self.condition];

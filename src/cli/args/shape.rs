@@ -83,7 +83,7 @@ pub struct ShapeArgs {
         help_heading = "Inside the surface"
     )]
     pub snap_embedded: Option<String>,
-    /// What to do with embedded points and edges outside the filled regions [default: error]
+    /// Treatment of embedded points and edges outside the filled regions [default: error]
     #[arg(long, value_name = "HOW", value_parser = word_of::<EmbedOutside>(OUTSIDE), help_heading = "Inside the surface")]
     pub embed_outside: Option<EmbedOutside>,
     /// Which regions to fill [default: what the surface's files say, else parity; with seeds or holes: seeds]

@@ -1,4 +1,4 @@
-//! Whether volume cells of a file are left out or bound the surface, and counts of both.
+//! Volume cells of a file: left out, or a mesh whose boundary is the surface.
 
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::CellBoundary;

@@ -1,4 +1,4 @@
-//! What a file holds beside its faces is read, noted or refused.
+//! Readers take, note or refuse the content of a file beside its faces.
 
 use super::*;
 
