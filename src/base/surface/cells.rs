@@ -23,7 +23,7 @@ const NONE: u32 = u32::MAX;
 
 sort_record! {
     /// A face of a cell.
-    struct CellFace {
+    struct VolumeFace {
         /// Vertices of the surface, ascending.
         key: [u32; 4],
         /// The cell, in the order given.
@@ -42,7 +42,7 @@ sort_record! {
 /// Memory: a quarter of that of `space` for sorting and 4 bytes for each cell, which spill to its folder.
 pub struct CellBoundary {
     space: ScratchSpace,
-    faces: Sorter<CellFace>,
+    faces: Sorter<VolumeFace>,
     regions: Vec<String>,
     region_ids: HashMap<String, u32>,
     n_cells: u32,
@@ -120,7 +120,7 @@ impl CellBoundary {
             let Some(apex) = apex else { continue };
             key.sort_unstable();
             let apex = corners[apex];
-            self.faces.push(CellFace { key, cell, region, corners: of_file, apex }).or_raise();
+            self.faces.push(VolumeFace { key, cell, region, corners: of_file, apex }).or_raise();
         }
         self.n_cells += 1;
         if self.n_cells & 1023 == 0 {

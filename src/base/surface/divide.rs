@@ -10,9 +10,9 @@ use std::collections::{HashMap, HashSet};
 use super::box_pairs::tree_of;
 use super::embedded::NEAR_SHARE;
 use super::embedded_contact::{has_area, is_on_edge, point_at_triangle};
-use super::point_table::PointTable;
 use super::seeker::{nearest_on_edge, nearest_point};
 use super::split::swap_inside;
+use super::vertex_table::VertexTable;
 use super::{BoxTree, EmbeddedSet, Surface, SurfaceError};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
@@ -39,8 +39,8 @@ pub struct Divided {
     pub farthest: f64,
 }
 
-/// Place of a vertex on the surface.
-enum Place {
+/// SurfacePlace of a vertex on the surface.
+enum SurfacePlace {
     /// A vertex of the surface.
     Vertex(u32),
     /// The edge between two vertices.
@@ -69,13 +69,13 @@ impl Surface {
         let tree = tree_of(self, scratch, |t| has_area(&self.corners(t)));
         let bounds = self.bounds();
         let largest = bounds.low.abs().max(bounds.high.abs()).max_element();
-        let reach = Reach {
+        let reach = SnapDistances {
             rounding: ROUNDING * largest,
             slack: NEAR_SHARE * largest,
             within,
             feature: (FEATURE_SHARE * within).max(ROUNDING * largest),
         };
-        let mut table = PointTable::new(&self.points);
+        let mut table = VertexTable::new(&self.points);
         let mut points = std::mem::take(&mut self.points);
         let mut pieces = TrianglePieces::new(&self.triangles);
         let (mut vertices, mut by_place) = (HashMap::new(), HashMap::new());
@@ -105,7 +105,7 @@ impl Surface {
             }
             let n_before = points.len();
             let vertex = match places[..] {
-                [Place::Vertex(vertex)] => vertex,
+                [SurfacePlace::Vertex(vertex)] => vertex,
                 _ => table.find_or_add(p, &mut points),
             };
             vertices.insert(v, vertex);
@@ -158,7 +158,7 @@ impl Surface {
 }
 
 /// Distances within which a vertex is on, or moved onto, a part of the surface.
-struct Reach {
+struct SnapDistances {
     /// Greatest distance of a vertex that lies on a part but for rounding, in input units.
     rounding: f64,
     /// Margin of boxes: rounding takes pieces out of their triangle's box by less.
@@ -197,12 +197,12 @@ impl TrianglePieces {
     }
 
     /// The places in `t` where `p`, which is no corner, lies exactly.
-    fn at(&self, t: u32, p: Point, points: &[Point]) -> Vec<Place> {
+    fn at(&self, t: u32, p: Point, points: &[Point]) -> Vec<SurfacePlace> {
         let is_at = |t: u32| point_at_triangle(p, &self.corners(t, points)).is_some();
         let place = |t: u32| {
             let ends = self.turned(t).map(|[a, b, _]| [a, b]);
             let edge = (ends.into_iter()).find(|e| is_on_edge(p, e.map(|v| points[v as usize])));
-            edge.map_or(Place::Triangle(t), Place::Edge)
+            edge.map_or(SurfacePlace::Triangle(t), SurfacePlace::Edge)
         };
         self.reached(t, is_at).into_iter().map(place).collect()
     }
@@ -231,7 +231,7 @@ impl TrianglePieces {
         p: Point,
         by: f64,
         points: &[Point],
-        reach: &Reach,
+        reach: &SnapDistances,
     ) -> Vec<u32> {
         let near = cube(p, by + reach.slack);
         let is_near = |t: u32| Aabb::around(self.corners(t, points)).meets(&near);
@@ -246,9 +246,9 @@ impl TrianglePieces {
         tree: &BoxTree,
         p: Point,
         points: &[Point],
-        reach: &Reach,
+        reach: &SnapDistances,
         taken: &HashSet<u32>,
-    ) -> Option<(Point, Place)> {
+    ) -> Option<(Point, SurfacePlace)> {
         let near = |d: f64| d < reach.within || d <= reach.rounding;
         let around = self.around(tree, p, reach.within.max(reach.rounding), points, reach);
         let feet = around.iter().map(|&t| (t, nearest_point(self.corners(t, points), p)));
@@ -264,7 +264,7 @@ impl TrianglePieces {
         let corners = corners.filter(|v| !taken.contains(v));
         let corners = corners.filter_map(|v| Some((best(points[v as usize])?, v)));
         if let Some((_, v)) = corners.min_by(|a, b| a.0.total_cmp(&b.0)) {
-            return Some((points[v as usize], Place::Vertex(v)));
+            return Some((points[v as usize], SurfacePlace::Vertex(v)));
         }
         let edges = around.iter().flat_map(|&t| self.turned(t)).map(|[a, b, _]| {
             let at = nearest_on_edge(points[a as usize], points[b as usize], p);
@@ -272,12 +272,12 @@ impl TrianglePieces {
         });
         let edge = edges.flatten().min_by(|a, b| a.0.total_cmp(&b.0));
         let (at, place) = match edge {
-            Some((_, at, edge)) => (at, Place::Edge(edge)),
-            None => (foot, Place::Triangle(t)),
+            Some((_, at, edge)) => (at, SurfacePlace::Edge(edge)),
+            None => (foot, SurfacePlace::Triangle(t)),
         };
         // A point that is there but for rounding stays, unless it alone does not lie there exactly.
         let is_exact = |x: Point| match place {
-            Place::Edge(e) => is_on_edge(x, e.map(|v| points[v as usize])),
+            SurfacePlace::Edge(e) => is_on_edge(x, e.map(|v| points[v as usize])),
             _ => point_at_triangle(x, &self.corners(t, points)).is_some(),
         };
         let stays = at.distance(p) <= reach.rounding && (is_exact(p) || !is_exact(at));
@@ -287,19 +287,19 @@ impl TrianglePieces {
     /// Divides all triangles at a place of vertex `v`.
     fn divide_place(
         &mut self,
-        place: &Place,
+        place: &SurfacePlace,
         v: u32,
         tree: &BoxTree,
         points: &[Point],
-        reach: &Reach,
+        reach: &SnapDistances,
     ) {
         let ends = match place {
-            Place::Vertex(_) => return,
-            Place::Triangle(t) => {
+            SurfacePlace::Vertex(_) => return,
+            SurfacePlace::Triangle(t) => {
                 let parts = self.turned(*t).map(|[a, b, _]| [a, b, v]);
                 return self.replace(*t, &parts);
             }
-            Place::Edge(ends) => ends,
+            SurfacePlace::Edge(ends) => ends,
         };
         for t in self.around(tree, points[v as usize], 0.0, points, reach) {
             let turned = self.turned(t).into_iter();

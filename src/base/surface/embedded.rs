@@ -10,7 +10,7 @@ use super::embedded_contact::{
     EdgeAtTriangle, EmbeddedEdge, has_area, is_on_edge, point_at_triangle,
 };
 use super::embedded_set::{EmbedError, Embedded, EmbeddedSet};
-use super::point_table::PointTable;
+use super::vertex_table::VertexTable;
 use super::{BoxTree, Surface, SurfaceError};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
@@ -135,7 +135,7 @@ impl Surface {
             });
         }
         self.drop_support_triangles();
-        let mut table = PointTable::new(&self.points);
+        let mut table = VertexTable::new(&self.points);
         let mut vert = |points: &mut Vec<Point>, v: u32| {
             table.find_or_add(other.points[v as usize] + Point::ZERO, points)
         };

@@ -39,14 +39,14 @@ pub(super) fn code(reason: Uncut) -> Code {
 }
 
 /// Two coordinates of points, scaled by a power of two.
-struct Plane {
+struct ProjectionPlane {
     axes: [usize; 2],
     scale: f64,
     /// The polygon that decided the plane runs clockwise in it.
     is_clockwise: bool,
 }
 
-impl Plane {
+impl ProjectionPlane {
     /// The plane in which a polygon has the largest area.
     fn new(polygon: impl Iterator<Item = Point> + Clone) -> Result<Self, Uncut> {
         let first = polygon.clone().next().unwrap_or_default();
@@ -91,7 +91,7 @@ impl Plane {
 
 /// Triangles of a polygon; `None` for the fan from its first corner.
 pub(super) fn cut_polygon(corners: &[Point]) -> Result<Option<Triangles>, Uncut> {
-    let plane = Plane::new(corners.iter().copied());
+    let plane = ProjectionPlane::new(corners.iter().copied());
     if let Ok(plane) = &plane
         && plane.is_fan(corners)
     {
@@ -122,7 +122,8 @@ pub(super) fn cut_facet(
     holes: &[Point],
 ) -> Result<Triangles, Uncut> {
     let loops = polygons.iter().filter(|p| p.len() > 2);
-    let mut planes = loops.filter_map(|p| Plane::new(p.iter().map(|&v| points[v as usize])).ok());
+    let mut planes =
+        loops.filter_map(|p| ProjectionPlane::new(p.iter().map(|&v| points[v as usize])).ok());
     let plane = planes.next().ok_or(FLAT)?;
     cut(points, polygons, holes, &plane, false)
 }
@@ -141,7 +142,7 @@ fn cut(
     points: &[Point],
     polygons: &[&[u32]],
     holes: &[Point],
-    plane: &Plane,
+    plane: &ProjectionPlane,
     is_simple: bool,
 ) -> Result<Triangles, Uncut> {
     let at = |p: Point| {

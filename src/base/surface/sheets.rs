@@ -1,7 +1,7 @@
 //! Embedded sheets: triangles that become faces of the mesh with the same volume on both sides.
 
 use super::edges::{Facets, TriangleAtEdge};
-use super::point_table::PointTable;
+use super::vertex_table::VertexTable;
 use super::weld::{drop_unused_labels, drop_unused_points};
 use super::{SourceFile, Surface, SurfaceError};
 use crate::storage::ScratchSpace;
@@ -62,7 +62,7 @@ impl Surface {
     /// [`SurfaceError::TooLarge`] beyond 2^30 vertices or triangles.
     pub fn embed(&mut self, other: &Self, name: &str) -> Result<(), SurfaceError> {
         let first = self.n_triangles();
-        let mut table = PointTable::new(&self.points);
+        let mut table = VertexTable::new(&self.points);
         let mut verts = Vec::with_capacity(other.points.len());
         for &p in &other.points {
             verts.push(table.find_or_add(p, &mut self.points));

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::point_table::PointTable;
 use super::polygon::{cut_facet, cut_polygon};
+use super::vertex_table::VertexTable;
 use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
 use crate::geom::Point;
 use crate::storage::{filled, push};
@@ -16,7 +16,7 @@ use crate::storage::{filled, push};
 #[derive(Default)]
 pub struct SurfaceBuilder {
     surface: Surface,
-    table: PointTable,
+    table: VertexTable,
     label_ids: HashMap<String, u32>,
     file: String,
     triangle_first: usize,
@@ -99,7 +99,7 @@ impl SurfaceBuilder {
         surface.triangles.truncate(self.triangle_first);
         surface.labels.truncate(self.triangle_first);
         surface.files.pop();
-        self.table = PointTable::new(&surface.points);
+        self.table = VertexTable::new(&surface.points);
         let name = std::mem::take(&mut self.file);
         self.begin_file(&name);
     }

@@ -13,7 +13,7 @@ use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
 
 /// A line of a file and its place.
-pub(super) type Row = (String, FilePlace);
+pub(super) type DeckLine = (String, FilePlace);
 
 /// A file being read.
 pub(super) struct Elements<'a, 'b> {
@@ -299,7 +299,7 @@ fn fields(text: &str) -> Vec<String> {
 }
 
 /// The next line of Nastran. Errors: a tab behind a field that is full, which some programs pass over and others do not.
-fn nastran_line<R: BufRead>(feed: &mut Feed<R>) -> Result<Option<Row>> {
+fn nastran_line<R: BufRead>(feed: &mut Feed<R>) -> Result<Option<DeckLine>> {
     let next = line(feed, "$")?;
     if let Some((text, place)) = next.as_ref().filter(|(text, _)| !text.contains(',')) {
         let mut column = 0usize;

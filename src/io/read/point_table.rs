@@ -52,7 +52,7 @@ struct Dialect {
 }
 
 /// The values of a line, before the file is known to have no other reading.
-type Values = ([f64; 4], String);
+type PointValues = ([f64; 4], String);
 
 /// Why a line does not fit a dialect.
 #[derive(Clone)]
@@ -88,7 +88,7 @@ impl Dialect {
         number.filter(|x: &f64| x.is_finite())
     }
 
-    fn values(&self, text: &str) -> std::result::Result<Values, Misfit> {
+    fn values(&self, text: &str) -> std::result::Result<PointValues, Misfit> {
         let fields = self.fields(text);
         let mut values = ([0.0; 4], String::new());
         let name_of = |words: &[&str]| {
@@ -207,7 +207,7 @@ impl Dialect {
     }
 
     /// A line as this dialect reads it, in words.
-    fn show(&self, (numbers, name): &Values) -> String {
+    fn show(&self, (numbers, name): &PointValues) -> String {
         let words = self.columns.iter().filter_map(|column| match column {
             Meaning::Number(axis) => {
                 Some(format!("{} {}", ["x", "y", "z", "h"][*axis], numbers[*axis]))

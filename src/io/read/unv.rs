@@ -4,14 +4,14 @@ use std::collections::{BTreeSet, HashMap};
 use std::io::BufRead;
 
 use super::feed::{Feed, Result, name};
-use super::fem::{Elements, Row, integer, line, real, unexpected, unsupported};
+use super::fem::{DeckLine, Elements, integer, line, real, unexpected, unsupported};
 use super::{FilePlace, SurfaceSink};
 use tetdb_base::surface::NoteKind;
 
 /// Reads a universal file of I-DEAS: nodes (2411, 781), elements (2412) and groups of elements, which are labels.
 pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut mesh = Elements::new(target);
-    let mut groups = Groups::default();
+    let mut groups = ElementGroups::default();
     let mut solids = Vec::new();
     while let Some((mark, place)) = line(&mut feed, "\0")? {
         if mark.trim() != "-1" {
@@ -69,18 +69,18 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
     mesh.finish(&feed)
 }
 
-/// Groups of elements.
+/// ElementGroups of elements.
 #[derive(Default)]
-struct Groups {
+struct ElementGroups {
     /// By element, the first group that has it.
     names: HashMap<i64, String>,
-    /// Groups with elements of another group before.
+    /// ElementGroups with elements of another group before.
     others: BTreeSet<String>,
 }
 
-impl Groups {
+impl ElementGroups {
     /// Reads a data set of groups: kind and number of an entity, and in later kinds of data sets two more words.
-    fn read(&mut self, kind: &str, mut rows: impl Iterator<Item = Row>) -> Result<()> {
+    fn read(&mut self, kind: &str, mut rows: impl Iterator<Item = DeckLine>) -> Result<()> {
         let each = if ["2432", "2430", "2429"].contains(&kind) { 2 } else { 4 };
         while let (Some((head, place)), Some((title, _))) = (rows.next(), rows.next()) {
             let n = numbers(&head, &place)?.last().copied().unwrap_or(0);
@@ -106,7 +106,7 @@ impl Groups {
 }
 
 /// Returns whether the matrix of a coordinate system is that of the global axes, which leaves nodes in place.
-fn are_global_axes(rows: impl Iterator<Item = Row>) -> bool {
+fn are_global_axes(rows: impl Iterator<Item = DeckLine>) -> bool {
     let words: Vec<String> = rows
         .skip(3)
         .flat_map(|(text, _)| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
@@ -124,7 +124,7 @@ fn numbers(text: &str, place: &FilePlace) -> Result<Vec<i64>> {
 /// The elements of data set 2412; solid ones go to `solids`.
 fn unv_elements(
     mesh: &mut Elements,
-    rows: impl Iterator<Item = Row>,
+    rows: impl Iterator<Item = DeckLine>,
     solids: &mut Vec<(i64, Vec<i64>, FilePlace)>,
 ) -> Result<()> {
     let mut rows = rows.peekable();
@@ -134,7 +134,7 @@ fn unv_elements(
         };
         // Beams have a line of three numbers for their orientation, rods in some files.
         let is_rod = kind == 11 && n == 2;
-        let has_three = |(row, _): &Row| row.split_whitespace().count() == 3;
+        let has_three = |(row, _): &DeckLine| row.split_whitespace().count() == 3;
         if matches!(kind, 21..=24) || is_rod && rows.peek().is_some_and(has_three) {
             rows.next();
         }

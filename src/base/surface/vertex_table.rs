@@ -5,12 +5,12 @@ use crate::storage::{filled, push};
 
 /// Open-addressing table from coordinate bits to vertex ids; at most half full.
 #[derive(Default)]
-pub(super) struct PointTable {
+pub(super) struct VertexTable {
     /// Vertex id + 1; 0 is free. The length is a power of two.
     slots: Vec<u32>,
 }
 
-impl PointTable {
+impl VertexTable {
     /// A table of `points`, which are all different.
     pub fn new(points: &[Point]) -> Self {
         // Half of the final size.
