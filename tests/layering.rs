@@ -23,6 +23,7 @@ const HOUSE: &[(&str, &[&[&str]])] = &[
             &["mesh", "topology"],
             &["delaunay", "reconnect", "sizing", "samples"],
             &["boundary", "refine", "optimize"],
+            &["blocks"],
             &["bisect"],
         ],
     ),

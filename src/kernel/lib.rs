@@ -10,6 +10,7 @@
 //! | [`boundary`] | input segments and facets appear |
 //! | [`refine`] | edges are divided until none is too long |
 //! | [`optimize`] | the worst tetrahedra become better |
+//! | [`blocks`] | saturation and smoothing in blocks, on all threads |
 //! | [`bisect`] | one cut: plane, zone, interface, two children |
 //! | [`topology`] | which sub-domains are neighbors |
 //!
@@ -19,6 +20,7 @@
 #![warn(missing_docs)]
 
 pub mod bisect;
+pub mod blocks;
 pub mod boundary;
 pub mod delaunay;
 pub mod mesh;

@@ -221,6 +221,13 @@ impl<P: Pages> Mesh<P> {
         Self::take_id::<{ kind::TETS }>(&mut self.pages, &mut self.state.tets, "tetrahedra")
     }
 
+    /// Forgets all tetrahedra and what was said of them.
+    pub fn clear_tets(&mut self) {
+        self.pages.clear::<{ kind::TETS }>();
+        self.pages.clear::<{ kind::TET_ATTRIBUTES }>();
+        self.state.tets = IdCounts::without_gaps(0);
+    }
+
     /// Takes the ids of `n` tetrahedra of a mesh that has none; each is then to be placed once, in any order.
     pub fn take_tets(&mut self, n: u32) {
         debug_assert_eq!(self.state.tets.fresh, 0);

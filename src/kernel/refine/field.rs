@@ -30,7 +30,7 @@ pub struct Field<'a> {
 impl Field<'_> {
     /// Whether points may go near a tetrahedron with these corners.
     #[inline(always)]
-    pub(super) fn reaches(&self, [a, b, c, d]: &[End; 4]) -> bool {
+    pub(crate) fn reaches(&self, [a, b, c, d]: &[End; 4]) -> bool {
         // Spelled out: `map` on arrays is not always inlined.
         let points = [a.point, b.point, c.point, d.point];
         !self.place.is_partial() || self.place.reaches(&points, &[a.h, b.h, c.h, d.h])

@@ -7,6 +7,7 @@ use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::storage::Pages;
 use tetdb_kernel::bisect::{OutsideZones, Zone};
+use tetdb_kernel::blocks;
 use tetdb_kernel::mesh::{Mesh, Workspace};
 use tetdb_kernel::optimize::{self, OptimizeReport};
 use tetdb_kernel::refine::{Everywhere, Field, PlacementRule, RefineReport, saturate};
@@ -43,10 +44,21 @@ pub fn saturate_and_optimize<P: Pages>(
     let place: &dyn PlacementRule = if zones.is_empty() { &Everywhere } else { &outside };
     let wanted =
         Field { h: &|p| field.h(p), place, lengths: common.method.lengths, bounds: common.bounds };
-    let refine = saturate(mesh, &wanted, space, &mut |inserted| {
+    let told = |inserted| {
         watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
-    })?;
+    };
+    // Switches to the kernel in blocks, which is not finished.
+    let in_blocks = std::env::var_os("TETDB_BLOCKS").is_some();
+    let refine = if in_blocks {
+        blocks::saturate(mesh, &wanted, &mut |inserted| told(inserted))
+    } else {
+        saturate(mesh, &wanted, space, &mut |inserted| told(inserted))?
+    };
     let refined = clock.elapsed().as_secs_f64();
-    let optimize = optimize::run(mesh, common.mode, &|p| watch(p.into()));
+    let mut settings = optimize::Settings::of(common.mode);
+    if in_blocks {
+        settings.odt_sweeps = 0;
+    }
+    let optimize = optimize::run_with(mesh, settings, &|p| watch(p.into()));
     Ok(FineReport { refine, optimize, seconds: [refined, clock.elapsed().as_secs_f64() - refined] })
 }

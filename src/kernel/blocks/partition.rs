@@ -1,0 +1,293 @@
+//! The partition into bricks and blocks: a k-d tree over the predicted load.
+//!
+//! It is a function of the coarse mesh and of the sizes alone. A *brick* is a leaf. A *block* is a subtree of some tens of
+//! thousands of tetrahedra; it works on its own bricks and on a *margin* of bricks around them. Two blocks conflict if their
+//! regions, which are own bricks and margin, share a brick.
+
+use super::load::Sample;
+use tetdb_base::geom::{Aabb, Point};
+
+/// Tetrahedra of a block when it is finished.
+const BLOCK_TETS: f64 = 32_000.0;
+/// A mesh is divided into at least so many blocks, unless these were smaller than [`BLOCK_TETS_MIN`].
+const BLOCKS_MIN: f64 = 24.0;
+const BLOCK_TETS_MIN: f64 = 6_000.0;
+/// Tetrahedra of a brick when it is finished.
+const BRICK_TETS: f64 = 500.0;
+/// Width of the margin in wanted lengths: of division, of smoothing, of the rounds.
+pub(super) const MARGINS: [f64; 3] = [3.0, 1.0, 2.0];
+/// Bins of the histogram that finds a weighted median.
+const BINS: usize = 1024;
+/// Orders in which the blocks are colored; the best counts.
+const ORDERS: usize = 200;
+
+/// A branch of the tree.
+#[derive(Clone, Copy, Debug)]
+struct Branch {
+    axis: usize,
+    plane: f64,
+    below: Node,
+    above: Node,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Node {
+    Branch(u32),
+    Leaf(u32),
+}
+
+/// A block.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    /// Its own bricks are consecutive.
+    pub bricks: std::ops::Range<u32>,
+    pub bounds: Aabb,
+    /// Predicted tetrahedra.
+    pub load: f64,
+    /// Own bricks and margin in ascending order, for each of [`MARGINS`].
+    pub regions: [Vec<u32>; 3],
+    /// Blocks it conflicts with, likewise.
+    pub conflicts: [Vec<u32>; 3],
+    /// Blocks of one color do not conflict. Of two that do, the one of smaller color goes first.
+    pub color: u32,
+}
+
+/// The partition.
+#[derive(Debug)]
+pub(super) struct Partition {
+    branches: Vec<Branch>,
+    root: Node,
+    /// Boxes of the bricks.
+    bricks: Vec<Aabb>,
+    /// The block of each brick.
+    owners: Vec<u32>,
+    pub blocks: Vec<Block>,
+}
+
+impl Partition {
+    /// Divides samples of the load, whose weights are tetrahedra, in `bounds`. `h` is the wanted length at a point.
+    pub fn new(mut samples: Vec<Sample>, bounds: Aabb, h: &(dyn Fn(Point) -> f64 + Sync)) -> Self {
+        let total: f64 = samples.iter().map(|s| f64::from(s.weight)).sum();
+        let block = BLOCK_TETS.min((total / BLOCKS_MIN).max(BLOCK_TETS_MIN));
+        let mut partition = Self {
+            branches: Vec::new(),
+            root: Node::Leaf(0),
+            bricks: Vec::new(),
+            owners: Vec::new(),
+            blocks: Vec::new(),
+        };
+        partition.root = partition.split(&mut samples, (total / block).ceil(), bounds, None);
+        let lengths: Vec<f64> =
+            partition.bricks.iter().map(|b| h((b.low + b.high) * 0.5)).collect();
+        for (kind, margin) in MARGINS.into_iter().enumerate() {
+            partition.find_regions(kind, margin, &lengths);
+            partition.find_conflicts(kind);
+        }
+        partition.color();
+        partition
+    }
+
+    pub fn n_bricks(&self) -> usize {
+        self.bricks.len()
+    }
+
+    /// The brick of a place.
+    #[inline]
+    pub fn find(&self, p: Point) -> u32 {
+        let mut node = self.root;
+        loop {
+            match node {
+                Node::Leaf(brick) => return brick,
+                Node::Branch(at) => {
+                    let branch = &self.branches[at as usize];
+                    let is_above = p[branch.axis] >= branch.plane;
+                    node = if is_above { branch.above } else { branch.below };
+                }
+            }
+        }
+    }
+
+    /// The block that owns a brick.
+    pub fn owner(&self, brick: u32) -> u32 {
+        self.owners[brick as usize]
+    }
+
+    /// Divides a cell into `n` parts of equal load: into blocks, or those of block `of` into bricks.
+    fn split(&mut self, samples: &mut [Sample], n: f64, bounds: Aabb, of: Option<u32>) -> Node {
+        if n <= 1.0 {
+            return self.leaf(samples, bounds, of);
+        }
+        let extent = match samples {
+            [] => bounds,
+            _ => Aabb::around(samples.iter().map(|s| s.at)),
+        };
+        let size = extent.high - extent.low;
+        let axis = (1..3).fold(0, |best, k| if size[k] > size[best] { k } else { best });
+        let n_below = (n * 0.5).floor();
+        let plane = weighted_quantile(samples, axis, &extent, n_below / n);
+        let n_low = partition_by(samples, |s| s.at[axis] < plane);
+        let (low, high) = samples.split_at_mut(n_low);
+        let (mut below, mut above) = (bounds, bounds);
+        below.high[axis] = plane;
+        above.low[axis] = plane;
+        let at = self.branches.len();
+        let unknown = Node::Leaf(0);
+        self.branches.push(Branch { axis, plane, below: unknown, above: unknown });
+        let below = self.split(low, n_below, below, of);
+        let above = self.split(high, n - n_below, above, of);
+        self.branches[at] = Branch { axis, plane, below, above };
+        Node::Branch(at as u32)
+    }
+
+    fn leaf(&mut self, samples: &mut [Sample], bounds: Aabb, of: Option<u32>) -> Node {
+        if let Some(block) = of {
+            self.bricks.push(bounds);
+            self.owners.push(block);
+            return Node::Leaf(self.bricks.len() as u32 - 1);
+        }
+        let load: f64 = samples.iter().map(|s| f64::from(s.weight)).sum();
+        let (from, id) = (self.bricks.len() as u32, self.blocks.len() as u32);
+        self.blocks.push(Block {
+            bricks: from..from,
+            bounds,
+            load,
+            regions: Default::default(),
+            conflicts: Default::default(),
+            color: 0,
+        });
+        let node = self.split(samples, (load / BRICK_TETS).ceil().max(1.0), bounds, Some(id));
+        self.blocks[id as usize].bricks.end = self.bricks.len() as u32;
+        node
+    }
+
+    /// The bricks within `margin` lengths of each block, which are the brick's.
+    fn find_regions(&mut self, kind: usize, margin: f64, lengths: &[f64]) {
+        for id in 0..self.blocks.len() {
+            let block = &self.blocks[id];
+            let is_in = |&brick: &u32| {
+                block.bricks.contains(&brick)
+                    || gap(&block.bounds, &self.bricks[brick as usize])
+                        <= margin * lengths[brick as usize]
+            };
+            let region = (0..self.bricks.len() as u32).filter(is_in).collect();
+            self.blocks[id].regions[kind] = region;
+        }
+    }
+
+    fn find_conflicts(&mut self, kind: usize) {
+        let mut blocks_of = vec![Vec::new(); self.bricks.len()];
+        for (id, block) in (0u32..).zip(&self.blocks) {
+            for &brick in &block.regions[kind] {
+                blocks_of[brick as usize].push(id);
+            }
+        }
+        for id in 0..self.blocks.len() {
+            let block = &mut self.blocks[id];
+            let others = block.regions[kind].iter().flat_map(|&b| &blocks_of[b as usize]);
+            let mut conflicts: Vec<u32> =
+                others.copied().filter(|&other| other as usize != id).collect();
+            conflicts.sort_unstable();
+            conflicts.dedup();
+            block.conflicts[kind] = conflicts;
+        }
+    }
+
+    /// Colors the blocks greedily in many orders; the coloring with the shortest chain of tasks counts.
+    fn color(&mut self) {
+        let n = self.blocks.len();
+        let mean = self.blocks.iter().map(|b| b.load).sum::<f64>() / n as f64;
+        // Part of a task's time does not depend on its load.
+        let times: Vec<f64> = self.blocks.iter().map(|b| 0.3 * b.load + 0.7 * mean).collect();
+        let mut best = (f64::INFINITY, Vec::new());
+        let mut random = 12_345u64;
+        for turn in 0..ORDERS {
+            let mut keyed: Vec<_> = (0..n)
+                .map(|b| {
+                    random = tetdb_base::geom::mix(random + 1);
+                    let degree = self.blocks[b].conflicts[0].len();
+                    // Every other order takes blocks with many conflicts first.
+                    let first = if turn % 2 == 0 { usize::MAX - degree / 4 } else { 0 };
+                    (first, random, b)
+                })
+                .collect();
+            keyed.sort_unstable();
+            let colors = self.greedy(keyed.into_iter().map(|k| k.2));
+            let chain = self.longest_chain(&colors, &times);
+            if chain < best.0 {
+                best = (chain, colors);
+            }
+        }
+        for (block, color) in self.blocks.iter_mut().zip(best.1) {
+            block.color = color;
+        }
+    }
+
+    fn greedy(&self, order: impl Iterator<Item = usize>) -> Vec<u32> {
+        let mut colors = vec![u32::MAX; self.blocks.len()];
+        let mut used = Vec::new();
+        for b in order {
+            used.clear();
+            let conflicts = self.blocks[b].conflicts[0].iter();
+            used.extend(conflicts.map(|&c| colors[c as usize]).filter(|&c| c != u32::MAX));
+            used.sort_unstable();
+            used.dedup();
+            let free = (0u32..).zip(&used).find(|(i, c)| *i != **c).map(|(i, _)| i);
+            colors[b] = free.unwrap_or(used.len() as u32);
+        }
+        colors
+    }
+
+    fn longest_chain(&self, colors: &[u32], times: &[f64]) -> f64 {
+        let mut order: Vec<usize> = (0..colors.len()).collect();
+        order.sort_by_key(|&b| colors[b]);
+        let mut ends = vec![0.0f64; colors.len()];
+        for b in order {
+            let before = self.blocks[b].conflicts[0].iter().map(|&c| c as usize);
+            let start = before.filter(|&c| colors[c] < colors[b]).map(|c| ends[c]);
+            ends[b] = start.fold(0.0, f64::max) + times[b];
+        }
+        ends.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// Distance of two boxes in the largest of the three directions.
+fn gap(a: &Aabb, b: &Aabb) -> f64 {
+    (b.low - a.high).max(a.low - b.high).max(Point::ZERO).max_element()
+}
+
+/// A plane that has about `share` of the weight below it.
+fn weighted_quantile(samples: &[Sample], axis: usize, extent: &Aabb, share: f64) -> f64 {
+    let (low, high) = (extent.low[axis], extent.high[axis]);
+    let scale = BINS as f64 / (high - low).max(f64::MIN_POSITIVE);
+    let mut bins = [0.0; BINS];
+    let mut total = 0.0;
+    for s in samples {
+        let bin = ((s.at[axis] - low) * scale) as usize;
+        bins[bin.min(BINS - 1)] += f64::from(s.weight);
+        total += f64::from(s.weight);
+    }
+    let wanted = share * total;
+    let (mut sum, mut cut) = (0.0, BINS as f64 * share);
+    for (i, &bin) in bins.iter().enumerate() {
+        if bin > 0.0 && sum + bin > wanted {
+            cut = i as f64 + ((wanted - sum) / bin).clamp(0.0, 1.0);
+            break;
+        }
+        sum += bin;
+    }
+    low + cut / scale
+}
+
+/// Brings the samples that pass to the front, returns how many.
+fn partition_by(samples: &mut [Sample], passes: impl Fn(&Sample) -> bool) -> usize {
+    let (mut i, mut j) = (0, samples.len());
+    while i < j {
+        if passes(&samples[i]) {
+            i += 1;
+        } else {
+            j -= 1;
+            samples.swap(i, j);
+        }
+    }
+    i
+}

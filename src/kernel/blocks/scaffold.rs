@@ -1,0 +1,114 @@
+//! Points that no tetrahedron is left without which would outreach a margin.
+//!
+//! A coarse mesh of a surface has tetrahedra from wall to wall. Before it is divided into blocks, those with an edge of several wanted lengths
+//! get their center, if that is far enough from all vertices.
+
+use crate::delaunay::Kernel;
+use crate::mesh::anatomy::mark::EXAMINED;
+use crate::mesh::anatomy::{EDGES, FACES, FROZEN, MARK};
+use crate::mesh::{Mesh, dense, sparse};
+use crate::refine::Field;
+use tetdb_base::geom::{HilbertFrame, Point, mix, orient};
+use tetdb_base::storage::{Pages, check_cancelled};
+
+use super::spawn::center;
+
+/// Wanted lengths for which one length of the scaffold stands.
+const COARSER: f64 = 2.5;
+/// Tetrahedra with an edge longer than this, in lengths of the scaffold, get a point.
+const LONG: f64 = 2.0;
+/// Least distance to a vertex in lengths of the scaffold.
+const FILTER: f64 = 0.75;
+/// Rounds at most: each halves what is long.
+const ROUNDS_MAX: u32 = 30;
+/// Levels of random order in the first round: its points come from cavities that would grow without.
+const LEVELS: u64 = 7;
+
+/// Inserts the points. Returns how many.
+pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
+    let order = HilbertFrame::new(&field.bounds);
+    let mut kernel = Kernel::default();
+    let mut last = None;
+    let mut inserted = 0;
+    for round in 0..ROUNDS_MAX {
+        check_cancelled();
+        let mut found = Vec::new();
+        for t in (0..dense(mesh.tet_ids_end())).map(sparse) {
+            let tet = mesh.tet(t);
+            if !tet.is_live() || tet.node[EXAMINED] & MARK != 0 {
+                continue;
+            }
+            mesh.set_mark(t, EXAMINED, true);
+            if let Some((point, h)) = wanted(mesh, t, field) {
+                let mut key = order.index(point);
+                if round == 0 {
+                    let random = mix(key ^ 77);
+                    let level = (0..LEVELS).find(|l| random >> (3 * l) & 7 == 0).unwrap_or(LEVELS);
+                    key = level << 61 | key >> 3;
+                }
+                found.push((key, t, point, h));
+            }
+        }
+        found.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.cmp(&b.1)));
+        let before = inserted;
+        for (_, t, point, h) in found {
+            let mut place = kernel.locate(mesh, point, t);
+            if let (Err(_), Some(last)) = (&place, last) {
+                place = kernel.locate(mesh, point, last);
+            }
+            let Ok(place) = place else {
+                continue;
+            };
+            let least = FILTER * COARSER * h;
+            let is_near = |mesh: &mut Mesh<P>, v: u32| {
+                (mesh.point(v) - point).length_squared() < least * least
+            };
+            if place.record.vertices().into_iter().any(|v| is_near(mesh, v)) {
+                continue;
+            }
+            let (region, _) = mesh.tet_attribute(place.tet);
+            if kernel.gather_constrained(mesh, point, &place, is_near).is_err() {
+                continue;
+            }
+            let is_frozen = (kernel.faces().iter())
+                .any(|f| f.required && mesh.tet_attribute(f.inside.tet()).1 & FROZEN != 0);
+            if is_frozen {
+                kernel.discard(mesh);
+                continue;
+            }
+            let v = mesh.add_vertex(point, h as f32);
+            let recycled = kernel.cavity().len();
+            last = Some(kernel.fill(mesh, v));
+            for &t in kernel.new_tets().iter().skip(recycled) {
+                mesh.set_tet_attribute(t, region, 0);
+            }
+            inserted += 1;
+        }
+        if inserted == before {
+            break;
+        }
+    }
+    inserted
+}
+
+/// The point that a long tetrahedron gets, and the length wanted there.
+fn wanted<P: Pages>(mesh: &mut Mesh<P>, t: u32, field: &Field) -> Option<(Point, f64)> {
+    let tet = mesh.tet(t);
+    let ends = mesh.ends(&tet);
+    let p = mesh.points(&tet);
+    let longest = EDGES.iter().map(|&[i, j]| (p[i] - p[j]).length_squared()).fold(0.0, f64::max);
+    let least = ends.iter().map(|e| f64::from(e.h)).fold(f64::INFINITY, f64::min);
+    let is_long = |h: f64| longest > (LONG * COARSER * h) * (LONG * COARSER * h);
+    let middle = (p[0] + p[1] + p[2] + p[3]) * 0.25;
+    if !is_long(least) && !is_long((field.h)(middle)) || !field.reaches(&ends) {
+        return None;
+    }
+    let sphere = p[0] + center(p)?;
+    let is_inside = FACES.iter().all(|&[a, b, c]| orient(sphere, p[a], p[b], p[c]) >= 0.0);
+    let point = if is_inside { sphere } else { middle };
+    let h = (field.h)(point);
+    let filter = FILTER * COARSER * h;
+    let is_far = p.iter().all(|&q| (q - point).length_squared() >= filter * filter);
+    let is_admitted = field.place.admits(point, h) && !field.place.forbids(point, h);
+    (is_long(h) && is_far && is_admitted).then_some((point, h))
+}

@@ -1,0 +1,181 @@
+//! Tasks in the order of a graph, on all free threads.
+//!
+//! A task is the visit of a block in a phase. It waits for the visits of conflicting blocks of smaller color in its phase, and for those of
+//! all conflicting blocks in the phase before. So the order of any two visits that could see each other is fixed beforehand,
+//! and the mesh is the same for any number of threads.
+
+use std::collections::BinaryHeap;
+use std::sync::{Condvar, Mutex, PoisonError};
+
+use super::partition::Partition;
+use tetdb_base::storage::{check_cancelled, in_place_scope, spare_threads};
+
+/// The graph of all visits; task `phase * n + block` for `n` blocks.
+pub(super) struct Graph {
+    n_blocks: usize,
+    /// Tasks that wait for each task.
+    followers: Vec<Vec<u32>>,
+    /// Tasks that each task waits for.
+    n_before: Vec<u32>,
+    /// Longest chain that begins with the task, in units of load.
+    urgency: Vec<u64>,
+}
+
+impl Graph {
+    /// Phases one after the other, each with one of the margins.
+    pub fn new(partition: &Partition, phases: &[usize]) -> Self {
+        let n = partition.blocks.len();
+        let mut followers = vec![Vec::new(); n * phases.len()];
+        let mut n_before = vec![0; n * phases.len()];
+        let mut add = |before: usize, after: usize| {
+            followers[before].push(after as u32);
+            n_before[after] += 1;
+        };
+        for (phase, &margin) in phases.iter().enumerate() {
+            for (b, block) in partition.blocks.iter().enumerate() {
+                let color = |c: u32| partition.blocks[c as usize].color;
+                for &c in &block.conflicts[margin] {
+                    if color(c) < block.color {
+                        add(phase * n + c as usize, phase * n + b);
+                    }
+                }
+                if phase > 0 {
+                    add((phase - 1) * n + b, phase * n + b);
+                    // The wider of both margins decides who can see whom.
+                    let before = phases[phase - 1];
+                    let (x, y) = (&block.conflicts[margin], &block.conflicts[before]);
+                    for &c in if x.len() > y.len() { x } else { y } {
+                        add((phase - 1) * n + c as usize, phase * n + b);
+                    }
+                }
+            }
+        }
+        let mut graph = Self { n_blocks: n, followers, n_before, urgency: Vec::new() };
+        graph.find_urgency(partition, phases.len());
+        graph
+    }
+
+    fn find_urgency(&mut self, partition: &Partition, n_phases: usize) {
+        let n = self.n_blocks;
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by_key(|&b| partition.blocks[b].color);
+        self.urgency = vec![0; n * n_phases];
+        for phase in (0..n_phases).rev() {
+            for &b in order.iter().rev() {
+                let task = phase * n + b;
+                let later = self.followers[task].iter().map(|&f| self.urgency[f as usize]);
+                self.urgency[task] = later.max().unwrap_or(0) + partition.blocks[b].load as u64 + 1;
+            }
+        }
+    }
+
+    pub fn n_tasks(&self) -> usize {
+        self.followers.len()
+    }
+
+    /// Phase and block of a task.
+    pub fn visit(&self, task: usize) -> (usize, usize) {
+        (task / self.n_blocks, task % self.n_blocks)
+    }
+
+    /// Does all tasks. Each thread has a scratch of its own, made by `scratch`. A panic, or a request to stop, ends all of them. `told`
+    /// is called between tasks, on the caller's thread.
+    pub fn run<S>(
+        &self,
+        scratch: &(dyn Fn() -> S + Sync),
+        work: &(dyn Fn(&mut S, usize) + Sync),
+        told: &mut dyn FnMut(),
+    ) {
+        let n_threads = spare_threads().min(self.n_blocks);
+        let ready = (0..self.n_tasks()).filter(|&t| self.n_before[t] == 0);
+        let state = State {
+            before: self.n_before.clone(),
+            ready: ready.map(|t| self.rank(t)).collect(),
+            done: 0,
+            is_over: false,
+        };
+        let queue = Queue { graph: self, state: Mutex::new(state), changed: Condvar::new() };
+        let thread = |told: &mut dyn FnMut()| {
+            let _end = EndOnUnwind(&queue);
+            let mut own = scratch();
+            while let Some(task) = queue.next() {
+                check_cancelled();
+                work(&mut own, task);
+                queue.finish(task);
+                told();
+            }
+        };
+        if n_threads <= 1 {
+            thread(told);
+            return;
+        }
+        in_place_scope(|scope| {
+            for _ in 1..n_threads {
+                scope.spawn(|_| thread(&mut || ()));
+            }
+            thread(told);
+        });
+    }
+
+    fn rank(&self, task: usize) -> (u64, std::cmp::Reverse<usize>) {
+        (self.urgency[task], std::cmp::Reverse(task))
+    }
+}
+
+struct State {
+    before: Vec<u32>,
+    /// Tasks to do, the most urgent first.
+    ready: BinaryHeap<(u64, std::cmp::Reverse<usize>)>,
+    done: usize,
+    /// A thread unwinds.
+    is_over: bool,
+}
+
+struct Queue<'a> {
+    graph: &'a Graph,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+impl Queue<'_> {
+    /// The next task, when there is one to do; `None` when all are done or a thread unwinds.
+    fn next(&self) -> Option<usize> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            if state.is_over || state.done == self.graph.n_tasks() {
+                return None;
+            }
+            if let Some((_, task)) = state.ready.pop() {
+                return Some(task.0);
+            }
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn finish(&self, task: usize) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.done += 1;
+        for &follower in &self.graph.followers[task] {
+            let before = &mut state.before[follower as usize];
+            *before -= 1;
+            if *before == 0 {
+                state.ready.push(self.graph.rank(follower as usize));
+            }
+        }
+        drop(state);
+        self.changed.notify_all();
+    }
+}
+
+/// Ends the others when its thread unwinds.
+struct EndOnUnwind<'a, 'b>(&'a Queue<'b>);
+
+impl Drop for EndOnUnwind<'_, '_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let queue = self.0;
+            queue.state.lock().unwrap_or_else(PoisonError::into_inner).is_over = true;
+            queue.changed.notify_all();
+        }
+    }
+}
