@@ -84,9 +84,11 @@ impl Divider {
                 self.spawner.examine(region, &is_due, chunk, field, &order, front);
                 self.insert(region, partition, field, own, &mut report);
             }
-            self.spawner.found.clear();
+            let n_refused = self.second.len();
             self.second_choices(region, again, field, &order);
             self.insert(region, partition, field, own, &mut report);
+            // There is no third choice.
+            self.second.truncate(n_refused);
             if report.inserted - before < FRONT_MIN {
                 front = false;
             }
@@ -113,6 +115,7 @@ impl Divider {
         field: &Field,
         order: &HilbertFrame,
     ) {
+        self.spawner.found.clear();
         for t in again {
             let tet = region.mesh.tet(t);
             let is_tried = tet.node[EXAMINED] & MARK != 0 && tet.node[GOOD] & MARK == 0;

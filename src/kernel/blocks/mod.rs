@@ -82,7 +82,9 @@ pub fn saturate<P: Pages>(
     let bricks = run.bricks.into_inner().unwrap_or_else(PoisonError::into_inner);
     convert::to_pages(&bricks, mesh);
     lap("pages");
-    run.report.into_inner().unwrap_or_else(PoisonError::into_inner)
+    let report = run.report.into_inner().unwrap_or_else(PoisonError::into_inner);
+    lap(&format!("{report:?}"));
+    report
 }
 
 /// Where the load of the mesh is.
