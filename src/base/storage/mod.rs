@@ -32,6 +32,7 @@ mod remote;
 mod reserve;
 mod run_context;
 mod scratch;
+mod shelf;
 mod sort;
 mod sort_record;
 mod spill;
@@ -58,6 +59,7 @@ pub use run_context::{
     CaughtPanic, RunContext, for_each_mut, in_place_scope, join, map_into, n_threads, parallel,
     spare_threads,
 };
+pub use shelf::{Shelf, Shelved};
 pub use sort::{Sorted, Sorter};
 pub use sort_record::sort_record;
 pub use sort_record::{KeyedId, Payload, SortBytes, SortField, SortRecord, total_order};

@@ -66,16 +66,19 @@ fn frames_of(bytes: u64) -> usize {
         .clamp(FRAMES_MIN, FRAMES_LIMIT)
 }
 
+/// Slots of frames, which are there when they are touched.
+fn zeroed(n: usize) -> Vec<Slot> {
+    bytemuck::allocation::try_zeroed_vec(n).unwrap_or_else(|()| {
+        raise(StorageError::NoMemory { bytes: (n * size_of::<Slot>()) as u64 })
+    })
+}
+
 impl Pager {
     /// A pool of `bytes / 64 KiB` frames (at least 16) over `backing`; without one, more pages than frames are an error.
     pub fn new(bytes: u64, backing: Option<Backing>) -> Self {
         let frames_max = frames_of(bytes);
-        let frames =
-            bytemuck::allocation::try_zeroed_vec(frames_max * SLOTS).unwrap_or_else(|()| {
-                raise(StorageError::NoMemory { bytes: (frames_max * FRAME_BYTES) as u64 })
-            });
         Self {
-            frames,
+            frames: zeroed(frames_max * SLOTS),
             frames_max,
             free: Vec::new(),
             tables: Default::default(),
@@ -438,6 +441,23 @@ impl Pages for Pager {
         self.release(dropped);
     }
 
+    fn bytes_used(&self) -> Option<[u64; 2]> {
+        let n_pages: usize = self.tables.iter().map(PageTable::len).sum();
+        let used = n_pages.min(self.frames_max);
+        Some([used, self.frames_max].map(|n| (n * FRAME_BYTES) as u64))
+    }
+
+    fn use_at_most(&mut self, bytes: u64) {
+        if !self.files.exist() {
+            return;
+        }
+        let frames = frames_of(bytes).min(self.frames.len() / SLOTS);
+        if frames < self.owners.len() {
+            self.leave_memory();
+        }
+        self.frames_max = frames;
+    }
+
     fn shared(&mut self) -> Option<SharedPages<'_>> {
         let mut all = self.tables.iter_mut().all(PageTable::make_readable);
         if !all && self.load_all() {
@@ -448,6 +468,37 @@ impl Pages for Pager {
 }
 
 impl Pager {
+    /// Writes every page that is not elsewhere, and gives all frames back to the system.
+    fn leave_memory(&mut self) {
+        let mut dirty = Vec::new();
+        for frame in 0..self.owners.len() as u32 {
+            if self.owners[frame as usize] == NO_OWNER || self.entry(frame) & DIRTY == 0 {
+                continue;
+            }
+            if self.is_output(frame) {
+                dirty.push(frame);
+            } else {
+                self.spill(frame);
+            }
+        }
+        dirty.sort_unstable_by_key(|&frame| self.owners[frame as usize]);
+        for batch in dirty.chunks(BATCH_PAGES_MAX) {
+            self.write_back(batch);
+        }
+        for frame in 0..self.owners.len() as u32 {
+            if self.owners[frame as usize] != NO_OWNER {
+                let place = self.place(frame);
+                self.set_entry(frame, place);
+            }
+        }
+        self.owners.clear();
+        self.order.clear();
+        self.free.clear();
+        let n = self.frames.len();
+        self.frames = Vec::new();
+        self.frames = zeroed(n);
+    }
+
     /// Loads all pages that are not in memory, such as pages of a newly opened mesh. `false` if there are too few
     /// frames.
     fn load_all(&mut self) -> bool {

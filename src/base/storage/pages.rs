@@ -59,6 +59,12 @@ pub trait Pages {
     fn drop_front<const K: usize>(&mut self, n: u32);
     /// Forgets all pages of kind `K`, as if there had never been one.
     fn clear<const K: usize>(&mut self);
+    /// Bytes of memory that the pages use, and that they may use. `None` if there is no limit.
+    fn bytes_used(&self) -> Option<[u64; 2]> {
+        None
+    }
+    /// Limits the memory to `bytes` of what it was at first, until the next call. Pages leave memory if they must.
+    fn use_at_most(&mut self, _bytes: u64) {}
     /// A view for several threads, when all pages are in memory.
     fn shared(&mut self) -> Option<SharedPages<'_>> {
         None

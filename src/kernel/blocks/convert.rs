@@ -1,156 +1,168 @@
 //! Bricks from the pages of a coarse mesh, and pages from bricks.
 
-use std::sync::Arc;
-
 use tetdb_schema::page::NONE;
 
-use super::brick::{Brick, Bricks, SLOT_BITS, SLOT_MASK};
+use super::brick::{Bricks, SLOT_BITS, SLOT_MASK, Slot};
 use super::flat::Vertex;
 use super::partition::Partition;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
-use crate::mesh::{FaceRef, Mesh, Tet, dense, sparse};
+use crate::mesh::{FaceRef, Mesh, dense, sparse};
 use tetdb_base::storage::{Pages, StorageError, raise};
 
-/// Where the vertices of the coarse mesh are: reference by dense id.
-type Places = Vec<(u32, u32)>;
-
-/// The bricks of a mesh, whose coarse vertices keep their number in their note.
-pub(super) fn to_bricks<P: Pages>(mesh: &mut Mesh<P>, partition: &Partition) -> Bricks {
-    let mut bricks = vec![Brick::default(); partition.n_bricks()];
-    let n = dense(mesh.tet_ids_end());
-    let vertices = place_vertices(mesh, n, partition, &mut bricks);
-    let mut places: Places = vec![(NONE, 0); n as usize];
-    let mut counts = vec![0u32; bricks.len()];
-    for k in 0..n {
-        let tet = mesh.tet(sparse(k));
-        if tet.is_live() {
-            let of = |v: u32| vertices[dense(v) as usize].0;
-            let [a, b, c, d] = tet.vertices().map(of);
-            let brick = a.min(b).min(c.min(d));
-            let count = &mut counts[brick as usize];
-            places[k as usize] = (brick, *count);
-            *count += 1;
-        }
-    }
-    let too_many = |n: usize| n > SLOT_MASK as usize;
-    if counts.iter().any(|&n| too_many(n as usize))
-        || bricks.iter().any(|b| too_many(b.vertices.len()))
-    {
-        raise(StorageError::TooMany { what: "tetrahedra in a part of a block" });
-    }
-    let mut stamps = vec![(NONE, 0u32); bricks.len()];
-    let mut order: Vec<u32> = (0..n).filter(|&k| places[k as usize].0 != NONE).collect();
-    order.sort_by_key(|&k| places[k as usize]);
-    for k in order {
-        let number = places[k as usize].0;
-        let brick = &mut bricks[number as usize];
-        let mut refer = |to: u32, slot: u32| {
-            let stamp = &mut stamps[to as usize];
-            if stamp.0 != number {
-                *stamp = (number, brick.near.len() as u32);
-                brick.near.push(to);
-            }
-            stamp.1 << SLOT_BITS | slot
-        };
-        let mut tet = mesh.tet(sparse(k));
-        for node in &mut tet.node {
-            let (to, slot) = vertices[dense(*node & VERTEX_MASK) as usize];
-            *node = *node & !(VERTEX_MASK | MARK) | refer(to, slot);
-        }
-        for face in &mut tet.neighbor {
-            if face.exists() {
-                let (to, slot) = places[dense(face.tet()) as usize];
-                *face = FaceRef::new(refer(to, slot), face.face());
-            }
-        }
-        brick.tets.push(tet);
-        brick.attributes.push(mesh.tet_attribute(sparse(k)));
-        brick.unexamined += 1;
-    }
-    bricks.into_iter().map(Arc::new).collect()
+/// A slot of a brick in one word of the scratch map. Bricks are fewer than the bits left.
+fn packed(to: Slot) -> u32 {
+    to.brick << SLOT_BITS | to.slot
 }
 
-fn place_vertices<P: Pages>(
-    mesh: &mut Mesh<P>,
-    n_tets: u32,
-    partition: &Partition,
-    bricks: &mut [Brick],
-) -> Places {
+fn unpacked(word: u32) -> Slot {
+    Slot { brick: word >> SLOT_BITS, slot: word & SLOT_MASK }
+}
+
+/// Gives the next slot of a brick.
+fn next_slot(counts: &mut [u32], brick: u32) -> Slot {
+    let count = &mut counts[brick as usize];
+    let slot = *count;
+    if slot == SLOT_MASK || brick >= NONE >> SLOT_BITS {
+        raise(StorageError::TooMany { what: "tetrahedra in a part of a block" });
+    }
+    *count += 1;
+    Slot { brick, slot }
+}
+
+/// Fills empty bricks with a mesh. Coarse vertices keep their id in their note. Effects: the scratch map is used up.
+pub(super) fn to_bricks<P: Pages>(mesh: &mut Mesh<P>, partition: &Partition, bricks: &Bricks) {
+    let n_vertices = dense(mesh.vertex_ids_end());
+    let n_tets = dense(mesh.tet_ids_end());
+    mesh.reset_scratch(n_vertices + n_tets, NONE);
     // Ids given back have no tetrahedron.
-    let mut places = vec![(NONE, 0); dense(mesh.vertex_ids_end()) as usize];
-    for tet in (0..n_tets).map(sparse) {
-        let tet = mesh.tet(tet);
+    for k in 0..n_tets {
+        let tet = mesh.tet(sparse(k));
         if tet.is_live() {
-            tet.vertices().into_iter().for_each(|v| places[dense(v) as usize].0 = 0);
+            tet.vertices().into_iter().for_each(|v| mesh.set_scratch(dense(v), 0));
         }
     }
+    let mut counts = vec![0u32; partition.n_bricks()];
     for v in mesh.vertex_ids() {
-        let place = &mut places[dense(v) as usize];
-        if place.0 == NONE {
+        if mesh.scratch(dense(v)) == NONE {
             continue;
         }
         let (point, h) = mesh.point_and_size(v);
-        let number = partition.find(point);
-        let vertices = &mut bricks[number as usize].vertices;
-        *place = (number, vertices.len() as u32);
-        vertices.push(Vertex::new(point, h, mesh.is_fixed(v), v));
+        let to = next_slot(&mut counts, partition.find(point));
+        mesh.set_scratch(dense(v), packed(to));
+        let vertex = Vertex::new(point, h, mesh.is_fixed(v), v);
+        bricks.change(to.brick, |brick| brick.vertices.push(vertex));
     }
-    places
+    counts.fill(0);
+    for k in 0..n_tets {
+        let tet = mesh.tet(sparse(k));
+        if tet.is_live() {
+            let [a, b, c, d] = tet.vertices().map(|v| unpacked(mesh.scratch(dense(v))).brick);
+            let to = next_slot(&mut counts, a.min(b).min(c.min(d)));
+            mesh.set_scratch(n_vertices + k, packed(to));
+        }
+    }
+    for k in 0..n_tets {
+        let mut tet = mesh.tet(sparse(k));
+        if !tet.is_live() {
+            continue;
+        }
+        let vertices = tet.vertices().map(|v| unpacked(mesh.scratch(dense(v))));
+        let across = tet.neighbor.map(|face| {
+            face.exists().then(|| unpacked(mesh.scratch(n_vertices + dense(face.tet()))))
+        });
+        let home = unpacked(mesh.scratch(n_vertices + k));
+        let attribute = mesh.tet_attribute(sparse(k));
+        bricks.change(home.brick, |brick| {
+            for (node, to) in tet.node.iter_mut().zip(vertices) {
+                *node = *node & !(VERTEX_MASK | MARK) | brick.refer(to);
+            }
+            for (face, to) in tet.neighbor.iter_mut().zip(across) {
+                if let Some(to) = to {
+                    *face = FaceRef::new(brick.refer(to), face.face());
+                }
+            }
+            debug_assert_eq!(brick.tets.len(), home.slot as usize);
+            brick.tets.push(tet);
+            brick.attributes.push(attribute);
+            brick.unexamined += 1;
+        });
+    }
+    mesh.clear_scratch();
 }
 
-/// Writes the bricks back: coarse vertices under their numbers, others behind; tetrahedra in the order of the bricks.
-pub(super) fn to_pages<P: Pages>(bricks: &Bricks, mesh: &mut Mesh<P>) {
-    let mut vertices: Vec<Vec<u32>> = Vec::with_capacity(bricks.len());
-    let mut firsts = Vec::with_capacity(bricks.len());
-    let mut n_tets = 0u32;
-    let mut ids: Vec<Vec<u32>> = Vec::with_capacity(bricks.len());
-    for brick in bricks {
-        let mut numbers = Vec::with_capacity(brick.vertices.len());
-        for vertex in &brick.vertices {
-            if vertex.note == NONE {
-                numbers.push(mesh.add_vertex(vertex.point, vertex.h()));
-            } else {
+/// Where the vertices and tetrahedra of a brick are in pages.
+struct Numbers {
+    /// Vertices of the coarse mesh, which come first; their ids are in the scratch map from here on.
+    n_coarse: u32,
+    coarse: u32,
+    /// Dense ids of the first new vertex and of the first tetrahedron.
+    vertex: u32,
+    tet: u32,
+}
+
+/// Writes the bricks back and empties them: coarse vertices under their ids, others behind; tetrahedra in the order of the bricks.
+///
+/// The mesh must have no tetrahedra. Effects: the scratch map is used up.
+pub(super) fn to_pages<P: Pages>(bricks: &Bricks, n_bricks: u32, mesh: &mut Mesh<P>) {
+    let mut numbers: Vec<Numbers> = Vec::with_capacity(n_bricks as usize);
+    let (mut n_coarse, mut n_tets) = (0, 0);
+    let mut gone = Vec::new();
+    mesh.clear_scratch();
+    for number in 0..n_bricks {
+        let brick = bricks.get(number);
+        let coarse = brick.vertices.iter().take_while(|v| v.note != NONE).count();
+        let vertex = dense(mesh.vertex_ids_end());
+        numbers.push(Numbers { n_coarse: coarse as u32, coarse: n_coarse, vertex, tet: n_tets });
+        n_tets += brick.tets.len() as u32;
+        for (k, vertex) in brick.vertices.iter().enumerate() {
+            if k < coarse {
+                mesh.set_scratch(n_coarse, vertex.note);
+                n_coarse += 1;
                 if !vertex.is_fixed() {
                     mesh.set_point(vertex.note, vertex.point);
+                    mesh.set_size(vertex.note, vertex.h());
                 }
-                numbers.push(vertex.note);
+                gone.extend((!vertex.point.is_finite()).then_some(vertex.note));
+            } else {
+                let v = mesh.add_vertex_behind(vertex.point, vertex.h());
+                gone.extend((!vertex.point.is_finite()).then_some(v));
             }
         }
-        vertices.push(numbers);
-        firsts.push(n_tets);
-        let mut in_brick = Vec::with_capacity(brick.tets.len());
-        for tet in &brick.tets {
-            in_brick.push(n_tets);
-            n_tets += u32::from(tet.is_live());
-        }
-        ids.push(in_brick);
     }
-    mesh.clear_tets();
     mesh.take_tets(n_tets);
-    for (brick, in_brick) in bricks.iter().zip(&ids) {
-        for ((tet, &attribute), &id) in brick.tets.iter().zip(&brick.attributes).zip(in_brick) {
+    let mut unused = Vec::new();
+    for number in 0..n_bricks {
+        let brick = bricks.take(number);
+        let first = numbers[number as usize].tet;
+        for (k, (tet, &attribute)) in (first..).zip(brick.tets.iter().zip(&brick.attributes)) {
+            let mut out = *tet;
             if !tet.is_live() {
+                mesh.place_tet(sparse(k), out);
+                unused.push(sparse(k));
                 continue;
             }
-            let at = |reference: u32| {
-                let number = brick.near[(reference >> SLOT_BITS) as usize];
-                (number as usize, (reference & SLOT_MASK) as usize)
-            };
-            let mut out = Tet { ..*tet };
             for node in &mut out.node {
-                let (number, slot) = at(*node & VERTEX_MASK);
-                *node = *node & !(VERTEX_MASK | MARK) | vertices[number][slot];
+                let at = brick.resolve(*node & VERTEX_MASK);
+                let there = &numbers[at.brick as usize];
+                let v = match at.slot.checked_sub(there.n_coarse) {
+                    Some(new) => sparse(there.vertex + new),
+                    None => mesh.scratch(there.coarse + at.slot),
+                };
+                *node = *node & !(VERTEX_MASK | MARK) | v;
             }
             for face in &mut out.neighbor {
-                if face.exists() {
-                    let (number, slot) = at(face.tet());
-                    *face = FaceRef::new(sparse(ids[number][slot]), face.face());
+                if let Some(at) = brick.across(*face) {
+                    let t = sparse(numbers[at.brick as usize].tet + at.slot);
+                    *face = FaceRef::new(t, face.face());
                 }
             }
-            mesh.place_tet(sparse(id), out);
+            mesh.place_tet(sparse(k), out);
             if attribute != (0, 0) {
-                mesh.set_tet_attribute(sparse(id), attribute.0, attribute.1);
+                mesh.set_tet_attribute(sparse(k), attribute.0, attribute.1);
             }
         }
     }
+    unused.into_iter().rev().for_each(|t| mesh.free_tet(t));
+    gone.into_iter().rev().for_each(|v| mesh.free_vertex(v));
+    mesh.clear_scratch();
 }

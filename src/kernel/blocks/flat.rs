@@ -6,7 +6,7 @@ use crate::mesh::{FaceRef, Tet};
 use tetdb_base::geom::Point;
 
 /// A vertex in an array or in a brick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(super) struct Vertex {
     pub point: Point,
@@ -25,6 +25,21 @@ impl Vertex {
     #[inline(always)]
     pub fn h(&self) -> f32 {
         self.h.abs()
+    }
+
+    /// Length with the sign that tells whether it is fixed, and note, as words.
+    pub fn words(&self) -> [u32; 2] {
+        [self.h.to_bits(), self.note]
+    }
+
+    /// A vertex from [`Vertex::words`].
+    pub fn of_words(point: Point, [h, note]: [u32; 2]) -> Self {
+        Self { point, h: f32::from_bits(h), note }
+    }
+
+    /// Moves a vertex that is not fixed, and changes the length wanted there. A vertex at infinity is gone.
+    pub fn set(&mut self, point: Point, h: f32) {
+        (self.point, self.h) = (point, h);
     }
 
     /// The same with another note.

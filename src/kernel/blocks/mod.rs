@@ -12,6 +12,7 @@ mod brick;
 mod convert;
 mod divide;
 mod flat;
+mod improve;
 mod insert;
 mod lawson;
 mod load;
@@ -24,9 +25,10 @@ mod spawn;
 mod tasks;
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError, RwLock};
+use std::sync::{Mutex, PoisonError};
 
 use crate::mesh::{Mesh, dense, sparse};
+use crate::optimize::{Mode, OperationCounts};
 use crate::refine::{Field, RefineReport};
 use brick::Bricks;
 use divide::Divider;
@@ -34,10 +36,22 @@ use partition::Partition;
 use region::Region;
 use smooth::Smoother;
 use tasks::Graph;
-use tetdb_base::storage::Pages;
+use tetdb_base::storage::{DiskPath, Pages, spare_threads};
 
-/// Margins of the phases, as places in `MARGINS`: of division and of smoothing.
-const PHASES: [usize; 2] = [0, 1];
+/// The first of two visits of a block; the second smooths and improves it. Each has the margin in that place of `MARGINS`.
+const DIVIDE: usize = 0;
+
+/// What was done.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Report {
+    /// Points tried and inserted.
+    pub refine: RefineReport,
+    /// Operations on bad tetrahedra.
+    pub operations: OperationCounts,
+}
+
+/// Margins for what was put off by all blocks, in wanted lengths.
+const WIDER_MARGINS: [f64; 3] = [8.0, 24.0, 80.0];
 
 /// Divides edges until the mesh is saturated, and smooths it.
 ///
@@ -46,8 +60,10 @@ const PHASES: [usize; 2] = [0, 1];
 pub fn saturate<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &Field,
+    mode: Mode,
+    dir: &DiskPath,
     progress: &mut dyn FnMut(u64),
-) -> RefineReport {
+) -> Report {
     let clock = std::time::Instant::now();
     let lap = |what: &str| {
         if std::env::var_os("TETDB_LAPS").is_some() {
@@ -63,25 +79,41 @@ pub fn saturate<P: Pages>(
         partition.n_bricks(),
         partition.blocks.iter().map(|b| b.color + 1).max().unwrap_or(0)
     ));
-    let bricks = RwLock::new(convert::to_bricks(mesh, &partition));
+    let n_bricks = partition.n_bricks();
+    let memory = Memory::of(mesh, &partition);
+    let bricks = Bricks::new(n_bricks, memory.bricks / 2, Some(dir.clone()));
+    mesh.pages_mut().use_at_most(memory.pages_at_first);
+    convert::to_bricks(mesh, &partition, &bricks);
+    mesh.clear_tets();
+    bricks.limit(memory.bricks);
+    mesh.pages_mut().use_at_most(memory.pages);
     lap("bricks");
-    let graph = Graph::new(&partition, &PHASES);
+    let graph = Graph::new(&partition, if mode == Mode::None { 1 } else { 2 });
     let run = Run {
         partition: &partition,
         field,
+        mode,
         bricks,
-        report: Mutex::new(RefineReport { inserted: scaffold, ..RefineReport::default() }),
+        report: Mutex::new(Report {
+            refine: RefineReport { inserted: scaffold, ..RefineReport::default() },
+            ..Report::default()
+        }),
         inserted: AtomicU64::new(scaffold),
     };
     let visit = |visitor: &mut Visitor, task| {
         let (phase, block) = graph.visit(task);
         run.visit(visitor, phase, block);
     };
-    graph.run(&Visitor::new, &visit, &mut || progress(run.inserted.load(Ordering::Relaxed)));
+    graph.run(memory.threads, &Visitor::new, &visit, &mut || {
+        progress(run.inserted.load(Ordering::Relaxed))
+    });
     lap("visits");
-    let bricks = run.bricks.into_inner().unwrap_or_else(PoisonError::into_inner);
-    convert::to_pages(&bricks, mesh);
-    lap("pages");
+    run.finish_rest();
+    run.bricks.limit(memory.bricks / 2);
+    mesh.pages_mut().use_at_most(memory.pages_at_first);
+    convert::to_pages(&run.bricks, n_bricks as u32, mesh);
+    mesh.pages_mut().use_at_most(u64::MAX);
+    lap(&format!("pages; bricks read and written {:?}", run.bricks.traffic()));
     let report = run.report.into_inner().unwrap_or_else(PoisonError::into_inner);
     lap(&format!("{report:?}"));
     report
@@ -105,8 +137,9 @@ fn samples<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<load::Sample> {
 struct Run<'a, 'b> {
     partition: &'a Partition,
     field: &'a Field<'b>,
-    bricks: RwLock<Bricks>,
-    report: Mutex<RefineReport>,
+    mode: Mode,
+    bricks: Bricks,
+    report: Mutex<Report>,
     inserted: AtomicU64,
 }
 
@@ -126,58 +159,109 @@ impl Visitor {
 impl Run<'_, '_> {
     fn visit(&self, visitor: &mut Visitor, phase: usize, id: usize) {
         let block = &self.partition.blocks[id];
-        let numbers = &block.regions[PHASES[phase]];
+        let numbers = &block.regions[phase];
         let region = &mut visitor.region;
-        {
-            let shared =
-                self.bricks.read().unwrap_or_else(PoisonError::into_inner).clone_of(numbers);
-            let mut outside = |number: u32| {
-                let all = self.bricks.read().unwrap_or_else(PoisonError::into_inner);
-                all[number as usize].clone()
-            };
-            region.check_out(numbers, &shared, &mut outside);
-        }
+        region.check_out(numbers, self.bricks.get_all(numbers), &mut |n| self.bricks.get(n));
         let own = numbers.partition_point(|&b| b < block.bricks.start) as u32;
         let is_own: Vec<bool> = numbers.iter().map(|b| block.bricks.contains(b)).collect();
-        if phase == 0 {
-            let color = |b: u32| self.partition.blocks[self.partition.owner(b) as usize].color;
-            let is_due: Vec<bool> = (numbers.iter().zip(&is_own))
-                .map(|(&b, &is_own)| is_own || color(b) < block.color)
-                .collect();
+        let color = |b: u32| self.partition.blocks[self.partition.owner(b) as usize].color;
+        // What a block could not do, for want of margin, those do that come later.
+        let is_due: Vec<bool> = (numbers.iter().zip(&is_own))
+            .map(|(&b, &is_own)| is_own || color(b) < block.color)
+            .collect();
+        if phase == DIVIDE {
             self.divide(visitor, &is_due, own);
         } else {
             if self.has_unexamined(block) {
                 self.divide(visitor, &is_own, own);
             }
             visitor.smoother.smooth(&mut visitor.region, &is_own);
+            if self.mode == Mode::Full {
+                let counts = improve::improve(&mut visitor.region, self.partition, &is_due, own);
+                self.report.lock().unwrap_or_else(PoisonError::into_inner).operations.add(&counts);
+            }
         }
         let made = visitor.region.check_in();
-        let mut all = self.bricks.write().unwrap_or_else(PoisonError::into_inner);
-        for (&number, brick) in numbers.iter().zip(made) {
-            all[number as usize] = brick;
+        self.bricks.put_all(numbers.iter().copied().zip(made));
+    }
+
+    /// Divides what no block could, in wider and wider regions. There is little of it, if any.
+    fn finish_rest(&self) {
+        let mut visitor = Visitor::new();
+        for margin in WIDER_MARGINS {
+            let blocks: Vec<u32> = (0u32..)
+                .zip(&self.partition.blocks)
+                .filter(|(_, block)| self.has_unexamined(block))
+                .map(|(id, _)| id)
+                .collect();
+            for id in blocks {
+                let numbers = self.partition.around(id, margin);
+                self.divide_own(&mut visitor, id, &numbers);
+            }
+        }
+        if std::env::var_os("TETDB_LAPS").is_some() {
+            let left = self.partition.blocks.iter().filter(|b| self.has_unexamined(b)).count();
+            eprintln!("{left} blocks left");
         }
     }
 
+    fn divide_own(&self, visitor: &mut Visitor, id: u32, numbers: &[u32]) {
+        let block = &self.partition.blocks[id as usize];
+        let shared = self.bricks.get_all(numbers);
+        visitor.region.check_out(numbers, shared, &mut |n| self.bricks.get(n));
+        let own = numbers.partition_point(|&b| b < block.bricks.start) as u32;
+        let is_own: Vec<bool> = numbers.iter().map(|b| block.bricks.contains(b)).collect();
+        self.divide(visitor, &is_own, own);
+        let made = visitor.region.check_in();
+        self.bricks.put_all(numbers.iter().copied().zip(made));
+    }
+
     fn has_unexamined(&self, block: &partition::Block) -> bool {
-        let all = self.bricks.read().unwrap_or_else(PoisonError::into_inner);
-        block.bricks.clone().any(|b| all[b as usize].unexamined > 0)
+        block.bricks.clone().any(|b| self.bricks.get(b).unexamined > 0)
     }
 
     fn divide(&self, visitor: &mut Visitor, is_due: &[bool], own: u32) {
         let Visitor { region, divider, .. } = visitor;
         let report = divider.divide(region, self.partition, self.field, is_due, own);
         self.inserted.fetch_add(report.inserted, Ordering::Relaxed);
-        self.report.lock().unwrap_or_else(PoisonError::into_inner).add(&report);
+        self.report.lock().unwrap_or_else(PoisonError::into_inner).refine.add(&report);
     }
 }
 
-/// Shared bricks by number.
-trait CloneOf {
-    fn clone_of(&self, numbers: &[u32]) -> Bricks;
+/// Bytes of memory by use, and threads.
+struct Memory {
+    /// Of the bricks.
+    bricks: usize,
+    /// Of the pages while blocks are visited, and while bricks are made of them or they of bricks.
+    pages: u64,
+    pages_at_first: u64,
+    threads: usize,
 }
 
-impl CloneOf for Bricks {
-    fn clone_of(&self, numbers: &[u32]) -> Bricks {
-        numbers.iter().map(|&n| self[n as usize].clone()).collect()
+/// Bytes of a visit: arrays of a region with its margin, and its bricks twice.
+const VISIT_BYTES: u64 = 16 << 20;
+/// Bytes of bricks per predicted tetrahedron.
+const TET_BYTES: u64 = 50;
+
+impl Memory {
+    /// Divides what the pages may use.
+    fn of<P: Pages>(mesh: &Mesh<P>, partition: &Partition) -> Self {
+        let threads = spare_threads();
+        let Some([used, most]) = mesh.pages().bytes_used() else {
+            return Self { bricks: usize::MAX, pages: u64::MAX, pages_at_first: u64::MAX, threads };
+        };
+        let load: f64 = partition.blocks.iter().map(|b| b.load).sum();
+        let wanted = (1.5 * load) as u64 * TET_BYTES;
+        if used + 2 * wanted + threads as u64 * VISIT_BYTES <= most {
+            return Self { bricks: usize::MAX, pages: most, pages_at_first: most, threads };
+        }
+        let threads = threads.min((most / 2 / VISIT_BYTES).max(1) as usize);
+        let rest = most.saturating_sub(threads as u64 * VISIT_BYTES).max(most / 4);
+        Self {
+            bricks: (rest - rest / 8) as usize,
+            pages: rest / 8,
+            pages_at_first: most / 2,
+            threads,
+        }
     }
 }

@@ -10,12 +10,13 @@ use tetdb_base::geom::{Aabb, Point};
 /// Tetrahedra of a block when it is finished.
 const BLOCK_TETS: f64 = 32_000.0;
 /// A mesh is divided into at least so many blocks, unless these were smaller than [`BLOCK_TETS_MIN`].
-const BLOCKS_MIN: f64 = 24.0;
+const BLOCKS_MIN: f64 = 60.0;
 const BLOCK_TETS_MIN: f64 = 6_000.0;
-/// Tetrahedra of a brick when it is finished.
-const BRICK_TETS: f64 = 500.0;
-/// Width of the margin in wanted lengths: of division, of smoothing, of the rounds.
-pub(super) const MARGINS: [f64; 3] = [3.0, 1.0, 2.0];
+/// Bricks of a block, and tetrahedra of a brick when it is finished, at least.
+const BRICKS: f64 = 64.0;
+const BRICK_TETS_MIN: f64 = 250.0;
+/// Width of the margin in wanted lengths: of division, and of smoothing with the rounds.
+pub(super) const MARGINS: [f64; 2] = [3.0, 2.0];
 /// Bins of the histogram that finds a weighted median.
 const BINS: usize = 1024;
 /// Orders in which the blocks are colored; the best counts.
@@ -45,9 +46,9 @@ pub(super) struct Block {
     /// Predicted tetrahedra.
     pub load: f64,
     /// Own bricks and margin in ascending order, for each of [`MARGINS`].
-    pub regions: [Vec<u32>; 3],
+    pub regions: [Vec<u32>; MARGINS.len()],
     /// Blocks it conflicts with, likewise.
-    pub conflicts: [Vec<u32>; 3],
+    pub conflicts: [Vec<u32>; MARGINS.len()],
     /// Blocks of one color do not conflict. Of two that do, the one of smaller color goes first.
     pub color: u32,
 }
@@ -57,8 +58,10 @@ pub(super) struct Block {
 pub(super) struct Partition {
     branches: Vec<Branch>,
     root: Node,
-    /// Boxes of the bricks.
-    bricks: Vec<Aabb>,
+    /// Boxes of the bricks, and the wanted length in the middle of each.
+    bricks: Vec<(Aabb, f64)>,
+    /// Boxes of the branches, and the greatest of those lengths.
+    boxes: Vec<(Aabb, f64)>,
     /// The block of each brick.
     owners: Vec<u32>,
     pub blocks: Vec<Block>,
@@ -69,18 +72,27 @@ impl Partition {
     pub fn new(mut samples: Vec<Sample>, bounds: Aabb, h: &(dyn Fn(Point) -> f64 + Sync)) -> Self {
         let total: f64 = samples.iter().map(|s| f64::from(s.weight)).sum();
         let block = BLOCK_TETS.min((total / BLOCKS_MIN).max(BLOCK_TETS_MIN));
+        let brick = (block / BRICKS).max(BRICK_TETS_MIN);
         let mut partition = Self {
             branches: Vec::new(),
             root: Node::Leaf(0),
             bricks: Vec::new(),
+            boxes: Vec::new(),
             owners: Vec::new(),
             blocks: Vec::new(),
         };
-        partition.root = partition.split(&mut samples, (total / block).ceil(), bounds, None);
-        let lengths: Vec<f64> =
-            partition.bricks.iter().map(|b| h((b.low + b.high) * 0.5)).collect();
+        let n_blocks = (total / block).ceil();
+        partition.root = partition.split(&mut samples, n_blocks, bounds, (None, brick));
+        for (bounds, length) in &mut partition.bricks {
+            *length = h((bounds.low + bounds.high) * 0.5);
+        }
+        partition.boxes = vec![(Aabb::EMPTY, 0.0); partition.branches.len()];
+        partition.find_boxes(partition.root);
         for (kind, margin) in MARGINS.into_iter().enumerate() {
-            partition.find_regions(kind, margin, &lengths);
+            for id in 0..partition.blocks.len() {
+                let region = partition.around(id as u32, margin);
+                partition.blocks[id].regions[kind] = region;
+            }
             partition.find_conflicts(kind);
         }
         partition.color();
@@ -113,7 +125,13 @@ impl Partition {
     }
 
     /// Divides a cell into `n` parts of equal load: into blocks, or those of block `of` into bricks.
-    fn split(&mut self, samples: &mut [Sample], n: f64, bounds: Aabb, of: Option<u32>) -> Node {
+    fn split(
+        &mut self,
+        samples: &mut [Sample],
+        n: f64,
+        bounds: Aabb,
+        of: (Option<u32>, f64),
+    ) -> Node {
         if n <= 1.0 {
             return self.leaf(samples, bounds, of);
         }
@@ -139,9 +157,10 @@ impl Partition {
         Node::Branch(at as u32)
     }
 
-    fn leaf(&mut self, samples: &mut [Sample], bounds: Aabb, of: Option<u32>) -> Node {
-        if let Some(block) = of {
-            self.bricks.push(bounds);
+    fn leaf(&mut self, samples: &mut [Sample], bounds: Aabb, of: (Option<u32>, f64)) -> Node {
+        let (block, brick) = of;
+        if let Some(block) = block {
+            self.bricks.push((bounds, 0.0));
             self.owners.push(block);
             return Node::Leaf(self.bricks.len() as u32 - 1);
         }
@@ -155,23 +174,49 @@ impl Partition {
             conflicts: Default::default(),
             color: 0,
         });
-        let node = self.split(samples, (load / BRICK_TETS).ceil().max(1.0), bounds, Some(id));
+        let n_bricks = (load / brick).ceil().max(1.0);
+        let node = self.split(samples, n_bricks, bounds, (Some(id), brick));
         self.blocks[id as usize].bricks.end = self.bricks.len() as u32;
         node
     }
 
-    /// The bricks within `margin` lengths of each block, which are the brick's.
-    fn find_regions(&mut self, kind: usize, margin: f64, lengths: &[f64]) {
-        for id in 0..self.blocks.len() {
-            let block = &self.blocks[id];
-            let is_in = |&brick: &u32| {
-                block.bricks.contains(&brick)
-                    || gap(&block.bounds, &self.bricks[brick as usize])
-                        <= margin * lengths[brick as usize]
-            };
-            let region = (0..self.bricks.len() as u32).filter(is_in).collect();
-            self.blocks[id].regions[kind] = region;
+    fn find_boxes(&mut self, node: Node) -> (Aabb, f64) {
+        match node {
+            Node::Leaf(brick) => self.bricks[brick as usize],
+            Node::Branch(at) => {
+                let branch = self.branches[at as usize];
+                let (below, above) = (self.find_boxes(branch.below), self.find_boxes(branch.above));
+                let both = (below.0.union(above.0), below.1.max(above.1));
+                self.boxes[at as usize] = both;
+                both
+            }
         }
+    }
+
+    /// The bricks of a block and those within `margin` lengths of it, which are the brick's; in ascending order.
+    pub fn around(&self, id: u32, margin: f64) -> Vec<u32> {
+        let block = &self.blocks[id as usize];
+        let mut found = Vec::new();
+        let mut open = vec![self.root];
+        while let Some(node) = open.pop() {
+            let (bounds, length) = match node {
+                Node::Leaf(brick) => self.bricks[brick as usize],
+                Node::Branch(at) => self.boxes[at as usize],
+            };
+            let is_own = matches!(node, Node::Leaf(b) if block.bricks.contains(&b));
+            if !is_own && gap(&block.bounds, &bounds) > margin * length {
+                continue;
+            }
+            match node {
+                Node::Leaf(brick) => found.push(brick),
+                Node::Branch(at) => {
+                    let branch = &self.branches[at as usize];
+                    open.extend([branch.below, branch.above]);
+                }
+            }
+        }
+        found.sort_unstable();
+        found
     }
 
     fn find_conflicts(&mut self, kind: usize) {

@@ -58,14 +58,14 @@ impl Region {
     pub fn check_out(
         &mut self,
         numbers: &[u32],
-        bricks: &[Arc<Brick>],
+        bricks: Vec<Arc<Brick>>,
         outside: &mut dyn FnMut(u32) -> Arc<Brick>,
     ) {
-        self.begin(numbers, bricks);
+        self.begin(numbers, &bricks);
         let mut beyond: Vec<Arc<Brick>> = Vec::new();
         let mut known = IdMap::<u32, u32>::default();
         let mut bases = Vec::new();
-        for (k, brick) in bricks.iter().enumerate() {
+        for (k, brick) in bricks.into_iter().enumerate() {
             bases.clear();
             for &number in &brick.near {
                 let base = match numbers.binary_search(&number) {
@@ -290,6 +290,11 @@ impl Region {
         }
         for v in self.slots.len()..self.mesh.vertices.len() {
             let place = self.brick_of[v];
+            if place == OUTSIDE {
+                // It was given back.
+                self.slots.push(Slot { brick: NONE, slot: NONE });
+                continue;
+            }
             let brick = &mut all[place as usize];
             self.slots.push(Slot { brick: place, slot: brick.len() as u32 });
             brick.push(self.mesh.vertices[v].with_note(NONE));

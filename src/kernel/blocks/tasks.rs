@@ -8,7 +8,7 @@ use std::collections::BinaryHeap;
 use std::sync::{Condvar, Mutex, PoisonError};
 
 use super::partition::Partition;
-use tetdb_base::storage::{check_cancelled, in_place_scope, spare_threads};
+use tetdb_base::storage::{check_cancelled, in_place_scope};
 
 /// The graph of all visits; task `phase * n + block` for `n` blocks.
 pub(super) struct Graph {
@@ -22,36 +22,34 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    /// Phases one after the other, each with one of the margins.
-    pub fn new(partition: &Partition, phases: &[usize]) -> Self {
+    /// `n_phases` one after the other, with the margins in that order.
+    pub fn new(partition: &Partition, n_phases: usize) -> Self {
         let n = partition.blocks.len();
-        let mut followers = vec![Vec::new(); n * phases.len()];
-        let mut n_before = vec![0; n * phases.len()];
+        let mut followers = vec![Vec::new(); n * n_phases];
+        let mut n_before = vec![0; n * n_phases];
         let mut add = |before: usize, after: usize| {
             followers[before].push(after as u32);
             n_before[after] += 1;
         };
-        for (phase, &margin) in phases.iter().enumerate() {
+        for phase in 0..n_phases {
             for (b, block) in partition.blocks.iter().enumerate() {
                 let color = |c: u32| partition.blocks[c as usize].color;
-                for &c in &block.conflicts[margin] {
+                for &c in &block.conflicts[phase] {
                     if color(c) < block.color {
                         add(phase * n + c as usize, phase * n + b);
                     }
                 }
                 if phase > 0 {
                     add((phase - 1) * n + b, phase * n + b);
-                    // The wider of both margins decides who can see whom.
-                    let before = phases[phase - 1];
-                    let (x, y) = (&block.conflicts[margin], &block.conflicts[before]);
-                    for &c in if x.len() > y.len() { x } else { y } {
+                    // The margin before was the wider one.
+                    for &c in &block.conflicts[phase - 1] {
                         add((phase - 1) * n + c as usize, phase * n + b);
                     }
                 }
             }
         }
         let mut graph = Self { n_blocks: n, followers, n_before, urgency: Vec::new() };
-        graph.find_urgency(partition, phases.len());
+        graph.find_urgency(partition, n_phases);
         graph
     }
 
@@ -78,15 +76,16 @@ impl Graph {
         (task / self.n_blocks, task % self.n_blocks)
     }
 
-    /// Does all tasks. Each thread has a scratch of its own, made by `scratch`. A panic, or a request to stop, ends all of them. `told`
+    /// Does all tasks on some threads. Each thread has a scratch of its own, made by `scratch`. A panic, or a request to stop, ends all of them. `told`
     /// is called between tasks, on the caller's thread.
     pub fn run<S>(
         &self,
+        threads: usize,
         scratch: &(dyn Fn() -> S + Sync),
         work: &(dyn Fn(&mut S, usize) + Sync),
         told: &mut dyn FnMut(),
     ) {
-        let n_threads = spare_threads().min(self.n_blocks);
+        let n_threads = threads.min(self.n_blocks);
         let ready = (0..self.n_tasks()).filter(|&t| self.n_before[t] == 0);
         let state = State {
             before: self.n_before.clone(),

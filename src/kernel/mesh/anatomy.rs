@@ -28,7 +28,10 @@ pub mod mark {
 pub const VERTEX_MASK: u32 = MARK - 1;
 
 /// A face of a tetrahedron, `4 * tet + face`, or [`FaceRef::NONE`].
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+#[derive(
+    Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, bytemuck::Pod, bytemuck::Zeroable,
+)]
+#[repr(transparent)]
 pub struct FaceRef(pub u32);
 
 impl FaceRef {
@@ -58,7 +61,8 @@ impl FaceRef {
 }
 
 /// A tetrahedron's record, copied out of its page.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Tet {
     /// Vertex ids with flag bits.
     pub node: [u32; 4],

@@ -154,6 +154,14 @@ impl<P: Pages> Mesh<P> {
         v
     }
 
+    /// Adds a vertex behind all others, also where ids were given back.
+    pub fn add_vertex_behind(&mut self, p: Point, h: f32) -> u32 {
+        let free = std::mem::replace(&mut self.state.vertices.free_head, NONE);
+        let v = self.add_vertex(p, h);
+        self.state.vertices.free_head = free;
+        v
+    }
+
     /// Takes back a vertex no tetrahedron has.
     pub fn free_vertex(&mut self, v: u32) {
         let slot = self.pages.write::<{ kind::VERTICES }>(v);

@@ -58,6 +58,17 @@ pub struct OperationCounts {
 }
 
 impl OperationCounts {
+    /// Adds what was done in another part of the mesh.
+    pub fn add(&mut self, other: &Self) {
+        self.attacked += other.attacked;
+        self.edges_removed += other.edges_removed;
+        self.faces_swapped += other.faces_swapped;
+        self.vertices_smoothed += other.vertices_smoothed;
+        self.edges_collapsed += other.edges_collapsed;
+        self.vertices_inserted += other.vertices_inserted;
+        self.rounds = self.rounds.max(other.rounds);
+    }
+
     /// Changes to the mesh.
     pub(super) fn changes(&self) -> u64 {
         self.edges_removed

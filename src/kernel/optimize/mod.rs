@@ -49,4 +49,4 @@ pub use lawson::LawsonStats;
 #[cfg(test)]
 pub use measure::{Histogram, QualityTable, measure};
 pub use mend::MendCounts;
-pub use run::{Mode, OptimizeReport, Progress, Settings, run, run_with};
+pub use run::{Mode, OptimizeReport, Progress, Settings, improve_all_but, mend, run, run_with};

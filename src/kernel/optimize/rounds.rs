@@ -99,6 +99,15 @@ impl Rounds {
         pages
     }
 
+    /// Marks tetrahedra that still exist as if all had failed on them.
+    pub(super) fn pass_over<P: Pages>(&mut self, mesh: &mut Mesh<P>, tets: &[u32]) {
+        for &t in tets {
+            if mesh.tet(t).is_live() {
+                self.mark(mesh, t, EXAMINED);
+            }
+        }
+    }
+
     fn mark<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, note: usize) {
         mesh.set_mark(t, note, true);
         self.marked.raise(t);

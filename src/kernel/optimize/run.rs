@@ -132,13 +132,42 @@ pub fn run_with<P: Pages>(
         rounds.run(mesh, SHARE, &mut |done, total| tell("improve low qualities", done, total));
         let mut bad = rounds.finish(mesh);
         report.operations = rounds.counts;
-        let mut mender = Mender::default();
-        mender.run(mesh, &mut bad, &mut |done| {
-            tell("mend", (1000.0 * done) as u32, 1000);
-        });
-        report.mended = mender.counts();
+        report.mended = mended(mesh, &mut bad, &tell);
     }
     report
+}
+
+fn mended<P: Pages>(
+    mesh: &mut Mesh<P>,
+    bad: &mut PageFlags,
+    tell: &dyn Fn(&'static str, u32, u32),
+) -> MendCounts {
+    let mut mender = Mender::default();
+    mender.run(mesh, bad, &mut |done| tell("mend", (1000.0 * done) as u32, 1000));
+    mender.counts()
+}
+
+/// Mends what rounds have left, and nothing else; effects as of [`run`].
+pub fn mend<P: Pages>(mesh: &mut Mesh<P>, progress: &dyn Fn(Progress)) -> MendCounts {
+    prepare(mesh);
+    let mut all = PageFlags::all(mesh);
+    mended(mesh, &mut all, &|stage, done, total| progress(Progress { stage, done, total }))
+}
+
+/// Rounds for tetrahedra that need them, but for those listed, whose turn is another time. `tet_of` must be right, all marks down; so are
+/// they afterwards.
+pub fn improve_all_but<P: Pages>(mesh: &mut Mesh<P>, others: &[u32]) -> OperationCounts {
+    let mut rounds = Rounds::new(PageFlags::all(mesh));
+    rounds.pass_over(mesh, others);
+    rounds.run(mesh, BAD, &mut |_, _| ());
+    let bad = rounds.finish(mesh);
+    for goal in [WORST, SHARE] {
+        rounds.flags.clone_from(&bad);
+        rounds.pass_over(mesh, others);
+        rounds.run(mesh, goal, &mut |_, _| ());
+        rounds.finish(mesh);
+    }
+    rounds.counts
 }
 
 /// Takes the marks down that refinement leaves, and points each vertex to its tetrahedron of smallest id.

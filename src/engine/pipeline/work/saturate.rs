@@ -9,8 +9,8 @@ use tetdb_base::storage::Pages;
 use tetdb_kernel::bisect::{OutsideZones, Zone};
 use tetdb_kernel::blocks;
 use tetdb_kernel::mesh::{Mesh, Workspace};
-use tetdb_kernel::optimize::{self, OptimizeReport};
-use tetdb_kernel::refine::{Everywhere, Field, PlacementRule, RefineReport, saturate};
+use tetdb_kernel::optimize::{self, Mode, OptimizeReport};
+use tetdb_kernel::refine::{Everywhere, Field, Lengths, PlacementRule, RefineReport, saturate};
 use tetdb_kernel::sizing::SizeField;
 
 /// Report of the fine step.
@@ -47,18 +47,25 @@ pub fn saturate_and_optimize<P: Pages>(
     let told = |inserted| {
         watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
     };
-    // Switches to the kernel in blocks, which is not finished.
-    let in_blocks = std::env::var_os("TETDB_BLOCKS").is_some();
-    let refine = if in_blocks {
-        blocks::saturate(mesh, &wanted, &mut |inserted| told(inserted))
-    } else {
-        saturate(mesh, &wanted, space, &mut |inserted| told(inserted))?
-    };
-    let refined = clock.elapsed().as_secs_f64();
-    let mut settings = optimize::Settings::of(common.mode);
+    // The way through pages stays for lengths between the ends of edges.
+    let in_blocks =
+        common.method.lengths == Lengths::Field && std::env::var_os("TETDB_PAGES").is_none();
     if in_blocks {
-        settings.odt_sweeps = 0;
+        let told = &mut |inserted| told(inserted);
+        let report = blocks::saturate(mesh, &wanted, common.mode, space.dir, told);
+        let refined = clock.elapsed().as_secs_f64();
+        let mut optimize =
+            OptimizeReport { operations: report.operations, ..OptimizeReport::default() };
+        match common.mode {
+            Mode::Full => optimize.mended = optimize::mend(mesh, &|p| watch(p.into())),
+            Mode::Delaunay => {}
+            Mode::None => optimize = optimize::run(mesh, common.mode, &|p| watch(p.into())),
+        }
+        let seconds = [refined, clock.elapsed().as_secs_f64() - refined];
+        return Ok(FineReport { refine: report.refine, optimize, seconds });
     }
-    let optimize = optimize::run_with(mesh, settings, &|p| watch(p.into()));
+    let refine = saturate(mesh, &wanted, space, &mut |inserted| told(inserted))?;
+    let refined = clock.elapsed().as_secs_f64();
+    let optimize = optimize::run(mesh, common.mode, &|p| watch(p.into()));
     Ok(FineReport { refine, optimize, seconds: [refined, clock.elapsed().as_secs_f64() - refined] })
 }
