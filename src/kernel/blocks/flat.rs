@@ -62,13 +62,15 @@ pub(super) type Attribute = (u32, u32);
 
 /// Vertices and tetrahedra of a block and its margin.
 ///
-/// A face without neighbor that is not required leads out of the arrays. Its tetrahedron is *held*: nothing may replace it, because the
-/// tetrahedron beyond refers to it.
+/// A tetrahedron with a neighbor outside the arrays is *held*: nothing may replace it, because that one refers to it. It has no neighbor
+/// there, as at a face of the surface.
 #[derive(Default)]
 pub(super) struct FlatMesh {
     pub vertices: Vec<Vertex>,
     pub tets: Vec<Tet>,
     pub attributes: Vec<Attribute>,
+    /// Per tetrahedron whether it is held.
+    pub held: Vec<bool>,
     /// Unused places of `tets`.
     pub free: Vec<u32>,
 }
@@ -79,6 +81,7 @@ impl FlatMesh {
         self.vertices.clear();
         self.tets.clear();
         self.attributes.clear();
+        self.held.clear();
         self.free.clear();
     }
 
@@ -115,10 +118,10 @@ impl FlatMesh {
         self.tet(face.tet()).vertex(face.face())
     }
 
-    /// Whether a face of the tetrahedron leads out of the arrays.
+    /// Whether nothing may replace the tetrahedron.
     #[inline(always)]
-    pub fn is_held(tet: &Tet) -> bool {
-        (0..4).any(|i| !tet.neighbor[i].exists() && !tet.is_required(i))
+    pub fn is_held(&self, t: u32) -> bool {
+        self.held[t as usize]
     }
 
     /// A place for a tetrahedron of the same region as `like`.
@@ -129,6 +132,7 @@ impl FlatMesh {
         }
         self.tets.push(EMPTY);
         self.attributes.push(like);
+        self.held.push(false);
         self.tets.len() as u32 - 1
     }
 

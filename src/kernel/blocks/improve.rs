@@ -82,7 +82,7 @@ fn free_gaps(mesh: &mut FlatMesh) {
         if !tet.is_live() {
             continue;
         }
-        if FlatMesh::is_held(&tet) {
+        if mesh.is_held(from) {
             // What is outside refers to it; only passes over pages miss it, and nothing is done to it.
             continue;
         }
@@ -117,7 +117,7 @@ fn require_faces_of_held(mesh: &mut FlatMesh) -> Vec<FaceRef> {
     let mut made = Vec::new();
     for t in 0..mesh.tets.len() as u32 {
         let tet = *mesh.tet(t);
-        if tet.is_live() && FlatMesh::is_held(&tet) {
+        if tet.is_live() && mesh.is_held(t) {
             made.extend((0..4).filter(|&i| !tet.is_required(i)).map(|i| FaceRef::new(t, i)));
         }
     }
@@ -241,6 +241,7 @@ impl Pages for ArrayPages {
 /// Brings tetrahedra and vertices back. A vertex that is gone lies at infinity.
 fn take_back(to: &mut FlatMesh, mesh: &mut Mesh<ArrayPages>, common: Option<Attribute>) {
     let n = mesh.pages().tets.len();
+    to.held.resize(n, false);
     match common {
         Some(common) => to.attributes.resize(n, common),
         None => {

@@ -199,6 +199,9 @@ impl Inserter {
         is_near: &impl Fn(&FlatMesh, u32, f64) -> bool,
     ) -> Result<(), Refusal> {
         let (t, e) = (entry.tet(), entry.face());
+        if mesh.is_held(t) {
+            return Err(Refusal::PutOff);
+        }
         let tet = *mesh.tet(t);
         // An even permutation that brings the face of entry to 0.
         let node = [tet.node[e], tet.node[1 ^ e], tet.node[2 ^ e], tet.node[3 ^ e]];
@@ -208,10 +211,7 @@ impl Inserter {
         // What lies across comes from afar: all of it is asked for before any is needed.
         let (mut apex, mut pending, mut inner) = ([0u32; 4], 0u32, 0u32);
         for i in 0..4 {
-            let is_open = node[i] & REQUIRED == 0;
-            if is_open && !across[i].exists() {
-                return Err(Refusal::PutOff);
-            }
+            let is_open = node[i] & REQUIRED == 0 && across[i].exists();
             let face = if is_open { across[i] } else { FaceRef::new(t, 0) };
             let other = mesh.tet(face.tet());
             apex[i] = other.vertex(face.face());

@@ -77,7 +77,7 @@ impl Lawson {
                 self.stack.push(t);
                 while let Some(t) = self.stack.pop() {
                     let tet = *mesh.tet(t);
-                    if tet.is_live() && !FlatMesh::is_held(&tet) {
+                    if tet.is_live() && !mesh.is_held(t) {
                         self.check(mesh, t, &tet);
                     }
                 }
@@ -104,7 +104,7 @@ impl Lawson {
     /// Flips face `i` of `t`, beyond which is vertex `q`; `false` when it cannot be.
     fn flip(&mut self, mesh: &mut FlatMesh, t: u32, tet: &Tet, i: usize, q: u32) -> bool {
         let other = tet.neighbor[i].tet();
-        if FlatMesh::is_held(mesh.tet(other)) {
+        if mesh.is_held(other) {
             return false;
         }
         let face = tet.face(i);
@@ -225,7 +225,7 @@ fn ring(
     let mut fourth = NONE;
     for k in 1.. {
         let tet = mesh.tet(current);
-        if FlatMesh::is_held(tet) {
+        if mesh.is_held(current) {
             return None;
         }
         tets[k] = current;

@@ -115,6 +115,7 @@ impl Region {
         }
         self.first_vertex.push(mesh.vertices.len() as u32);
         self.first_tet.push(mesh.tets.len() as u32);
+        mesh.held.resize(mesh.tets.len(), false);
     }
 
     /// Turns the references of a tetrahedron into places in the arrays.
@@ -153,6 +154,7 @@ impl Region {
             tet.neighbor[i] = if first == NONE {
                 let beyond = Slot { brick: place, slot: slot << 2 | face.face() as u32 };
                 self.ways_out.push((FaceRef::new(t, i), beyond));
+                self.mesh.held[t as usize] = true;
                 FaceRef::NONE
             } else {
                 FaceRef::new(first + slot, face.face())

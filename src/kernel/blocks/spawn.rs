@@ -117,7 +117,7 @@ impl Spawner {
         for &t in tets {
             let tet = *region.mesh.tet(t);
             let is_good = tet.node[GOOD] & MARK != 0;
-            if !tet.is_live() || is_good || FlatMesh::is_held(&tet) || !is_due(region, &tet) {
+            if !tet.is_live() || is_good || region.mesh.is_held(t) || !is_due(region, &tet) {
                 continue;
             }
             let corners = region.mesh.corners(&tet);
