@@ -6,6 +6,8 @@
 //! only when a page is missed: the least recent frame without the bit is evicted, one with the bit is
 //! given a second chance. A list touched at each change of page costs 70 % (measured), a bit a few.
 
+mod memory;
+
 use lru::LruCache;
 use tetdb_schema::page::{FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, u32_le};
 
@@ -14,6 +16,7 @@ use super::page_table::{
     DIRTY, FRAMES_LIMIT, IN_BASE, IN_OUTPUT, PageTable, REFERENCED, RESIDENT, frame_of,
 };
 use super::{DiskPath, OrRaise, Pages, SharedPages, StorageError, check_cancelled, kind, raise};
+use memory::{frames_of, zeroed};
 
 /// Dirty pages written in one commit; a quarter of redb's cache.
 const BATCH_PAGES_MAX: usize = 256;
@@ -59,20 +62,6 @@ pub struct Pager {
     stats: PagerStats,
 }
 
-/// Frames in a pool of `bytes`.
-fn frames_of(bytes: u64) -> usize {
-    usize::try_from(bytes / FRAME_BYTES as u64)
-        .unwrap_or(usize::MAX)
-        .clamp(FRAMES_MIN, FRAMES_LIMIT)
-}
-
-/// Slots of frames, which are there when they are touched.
-fn zeroed(n: usize) -> Vec<Slot> {
-    bytemuck::allocation::try_zeroed_vec(n).unwrap_or_else(|()| {
-        raise(StorageError::NoMemory { bytes: (n * size_of::<Slot>()) as u64 })
-    })
-}
-
 impl Pager {
     /// A pool of `bytes / 64 KiB` frames (at least 16) over `backing`; without one, more pages than frames are an error.
     pub fn new(bytes: u64, backing: Option<Backing>) -> Self {
@@ -88,20 +77,6 @@ impl Pager {
             files: PageFiles::new(backing),
             stats: PagerStats::default(),
         }
-    }
-
-    /// Limits the frames to `bytes`, which must suffice for the frames in use and cannot exceed the initial size.
-    pub fn limit(&mut self, bytes: u64) {
-        let limit = frames_of(bytes).min(self.frames.len() / SLOTS);
-        assert!(self.owners.len() <= limit, "more frames than it may use");
-        self.frames_max = limit;
-    }
-
-    /// [`Pager::limit`], and gives a pool that was created without one a place for pages that leave memory.
-    pub fn limit_with_backing(&mut self, bytes: u64, backing: Backing) {
-        assert!(!self.files.exist(), "its pages would be in two places");
-        self.limit(bytes);
-        self.files = PageFiles::new(Some(backing));
     }
 
     /// Reads and writes so far.
@@ -442,20 +417,11 @@ impl Pages for Pager {
     }
 
     fn bytes_used(&self) -> Option<[u64; 2]> {
-        let n_pages: usize = self.tables.iter().map(PageTable::len).sum();
-        let used = n_pages.min(self.frames_max);
-        Some([used, self.frames_max].map(|n| (n * FRAME_BYTES) as u64))
+        Some(self.bytes_of_pages())
     }
 
     fn use_at_most(&mut self, bytes: u64) {
-        if !self.files.exist() {
-            return;
-        }
-        let frames = frames_of(bytes).min(self.frames.len() / SLOTS);
-        if frames < self.owners.len() {
-            self.leave_memory();
-        }
-        self.frames_max = frames;
+        self.limit_for_a_while(bytes);
     }
 
     fn shared(&mut self) -> Option<SharedPages<'_>> {
@@ -468,37 +434,6 @@ impl Pages for Pager {
 }
 
 impl Pager {
-    /// Writes every page that is not elsewhere, and gives all frames back to the system.
-    fn leave_memory(&mut self) {
-        let mut dirty = Vec::new();
-        for frame in 0..self.owners.len() as u32 {
-            if self.owners[frame as usize] == NO_OWNER || self.entry(frame) & DIRTY == 0 {
-                continue;
-            }
-            if self.is_output(frame) {
-                dirty.push(frame);
-            } else {
-                self.spill(frame);
-            }
-        }
-        dirty.sort_unstable_by_key(|&frame| self.owners[frame as usize]);
-        for batch in dirty.chunks(BATCH_PAGES_MAX) {
-            self.write_back(batch);
-        }
-        for frame in 0..self.owners.len() as u32 {
-            if self.owners[frame as usize] != NO_OWNER {
-                let place = self.place(frame);
-                self.set_entry(frame, place);
-            }
-        }
-        self.owners.clear();
-        self.order.clear();
-        self.free.clear();
-        let n = self.frames.len();
-        self.frames = Vec::new();
-        self.frames = zeroed(n);
-    }
-
     /// Loads all pages that are not in memory, such as pages of a newly opened mesh. `false` if there are too few
     /// frames.
     fn load_all(&mut self) -> bool {

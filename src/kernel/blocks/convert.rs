@@ -102,8 +102,9 @@ struct Numbers {
 
 /// Writes the bricks back and empties them: coarse vertices under their ids, others behind; tetrahedra in the order of the bricks.
 ///
-/// The mesh must have no tetrahedra. Effects: the scratch map is used up.
-pub(super) fn to_pages<P: Pages>(bricks: &Bricks, n_bricks: u32, mesh: &mut Mesh<P>) {
+/// The mesh must have no tetrahedra. Returns how many have several required faces. Effects: the scratch map is used up.
+pub(super) fn to_pages<P: Pages>(bricks: &Bricks, n_bricks: u32, mesh: &mut Mesh<P>) -> u64 {
+    let mut over_constrained = 0;
     let mut numbers: Vec<Numbers> = Vec::with_capacity(n_bricks as usize);
     let (mut n_coarse, mut n_tets) = (0, 0);
     let mut gone = Vec::new();
@@ -141,6 +142,7 @@ pub(super) fn to_pages<P: Pages>(bricks: &Bricks, n_bricks: u32, mesh: &mut Mesh
                 unused.push(sparse(k));
                 continue;
             }
+            over_constrained += u64::from((0..4).filter(|&i| tet.is_required(i)).count() > 1);
             for node in &mut out.node {
                 let at = brick.resolve(*node & VERTEX_MASK);
                 let there = &numbers[at.brick as usize];
@@ -165,4 +167,5 @@ pub(super) fn to_pages<P: Pages>(bricks: &Bricks, n_bricks: u32, mesh: &mut Mesh
     unused.into_iter().rev().for_each(|t| mesh.free_tet(t));
     gone.into_iter().rev().for_each(|v| mesh.free_vertex(v));
     mesh.clear_scratch();
+    over_constrained
 }

@@ -64,21 +64,8 @@ pub fn saturate<P: Pages>(
     dir: &DiskPath,
     progress: &mut dyn FnMut(u64),
 ) -> Report {
-    let clock = std::time::Instant::now();
-    let lap = |what: &str| {
-        if std::env::var_os("TETDB_LAPS").is_some() {
-            eprintln!("{:8.3} {what}", clock.elapsed().as_secs_f64());
-        }
-    };
     let scaffold = scaffold::build(mesh, field);
-    lap("scaffold");
     let partition = Partition::new(samples(mesh, field), field.bounds, field.h);
-    lap(&format!(
-        "partition: {} blocks, {} bricks, {} colors",
-        partition.blocks.len(),
-        partition.n_bricks(),
-        partition.blocks.iter().map(|b| b.color + 1).max().unwrap_or(0)
-    ));
     let n_bricks = partition.n_bricks();
     let memory = Memory::of(mesh, &partition);
     let bricks = Bricks::new(n_bricks, memory.bricks / 2, Some(dir.clone()));
@@ -87,7 +74,6 @@ pub fn saturate<P: Pages>(
     mesh.clear_tets();
     bricks.limit(memory.bricks);
     mesh.pages_mut().use_at_most(memory.pages);
-    lap("bricks");
     let graph = Graph::new(&partition, if mode == Mode::None { 1 } else { 2 });
     let run = Run {
         partition: &partition,
@@ -107,15 +93,15 @@ pub fn saturate<P: Pages>(
     graph.run(memory.threads, &Visitor::new, &visit, &mut || {
         progress(run.inserted.load(Ordering::Relaxed))
     });
-    lap("visits");
     run.finish_rest();
     run.bricks.limit(memory.bricks / 2);
     mesh.pages_mut().use_at_most(memory.pages_at_first);
-    convert::to_pages(&run.bricks, n_bricks as u32, mesh);
+    let over_constrained = convert::to_pages(&run.bricks, n_bricks as u32, mesh);
     mesh.pages_mut().use_at_most(u64::MAX);
-    lap(&format!("pages; bricks read and written {:?}", run.bricks.traffic()));
-    let report = run.report.into_inner().unwrap_or_else(PoisonError::into_inner);
-    lap(&format!("{report:?}"));
+    let mut report = run.report.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if !field.place.is_partial() {
+        report.refine.over_constrained = over_constrained;
+    }
     report
 }
 
@@ -198,10 +184,6 @@ impl Run<'_, '_> {
                 let numbers = self.partition.around(id, margin);
                 self.divide_own(&mut visitor, id, &numbers);
             }
-        }
-        if std::env::var_os("TETDB_LAPS").is_some() {
-            let left = self.partition.blocks.iter().filter(|b| self.has_unexamined(b)).count();
-            eprintln!("{left} blocks left");
         }
     }
 

@@ -12,6 +12,8 @@ const BLOCK_TETS: f64 = 32_000.0;
 /// A mesh is divided into at least so many blocks, unless these were smaller than [`BLOCK_TETS_MIN`].
 const BLOCKS_MIN: f64 = 60.0;
 const BLOCK_TETS_MIN: f64 = 6_000.0;
+/// A mesh is divided into about so many blocks at most, so that numbers of bricks have room beside those of slots.
+const BLOCKS_MAX: f64 = 1_900.0;
 /// Bricks of a block, and tetrahedra of a brick when it is finished, at least.
 const BRICKS: f64 = 64.0;
 const BRICK_TETS_MIN: f64 = 250.0;
@@ -72,6 +74,7 @@ impl Partition {
     pub fn new(mut samples: Vec<Sample>, bounds: Aabb, h: &(dyn Fn(Point) -> f64 + Sync)) -> Self {
         let total: f64 = samples.iter().map(|s| f64::from(s.weight)).sum();
         let block = BLOCK_TETS.min((total / BLOCKS_MIN).max(BLOCK_TETS_MIN));
+        let block = block.max(total / BLOCKS_MAX);
         let brick = (block / BRICKS).max(BRICK_TETS_MIN);
         let mut partition = Self {
             branches: Vec::new(),

@@ -48,9 +48,7 @@ pub fn saturate_and_optimize<P: Pages>(
         watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
     };
     // The way through pages stays for lengths between the ends of edges.
-    let in_blocks =
-        common.method.lengths == Lengths::Field && std::env::var_os("TETDB_PAGES").is_none();
-    if in_blocks {
+    if common.method.lengths == Lengths::Field {
         let told = &mut |inserted| told(inserted);
         let report = blocks::saturate(mesh, &wanted, common.mode, space.dir, told);
         let refined = clock.elapsed().as_secs_f64();
@@ -58,7 +56,7 @@ pub fn saturate_and_optimize<P: Pages>(
             OptimizeReport { operations: report.operations, ..OptimizeReport::default() };
         match common.mode {
             Mode::Full => optimize.mended = optimize::mend(mesh, &|p| watch(p.into())),
-            Mode::Delaunay => {}
+            Mode::Delaunay => mesh.refresh_tet_of(),
             Mode::None => optimize = optimize::run(mesh, common.mode, &|p| watch(p.into())),
         }
         let seconds = [refined, clock.elapsed().as_secs_f64() - refined];
