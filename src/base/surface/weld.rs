@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::label_sets::drop_unused_labels;
 use super::polygon::{cut_facet, cut_polygon};
 use super::vertex_table::VertexTable;
 use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
@@ -15,11 +16,15 @@ use crate::storage::{filled, push};
 /// their vertices. Same calls, same surface: nothing depends on hash order.
 #[derive(Default)]
 pub struct SurfaceBuilder {
-    surface: Surface,
+    pub(super) surface: Surface,
     table: VertexTable,
     label_ids: HashMap<String, u32>,
+    /// Labels that stand for several, by their members.
+    pub(super) set_ids: HashMap<Vec<u32>, u32>,
+    /// Triangles listed in several groups are to become one each.
+    pub(super) joins_groups: bool,
     file: String,
-    triangle_first: usize,
+    pub(super) triangle_first: usize,
     /// Vertices, notes and seeds before this file.
     before: [usize; 3],
     /// Vertex of the file -> welded vertex.
@@ -82,7 +87,7 @@ impl SurfaceBuilder {
         self.before = [surface.points.len(), surface.notes.len(), surface.seeds.len()];
         self.file2vert.clear();
         (self.n_welded, self.n_fanned, self.n_cut, self.n_repeated) = (0, 0, 0, 0);
-        self.by_position = false;
+        (self.by_position, self.joins_groups) = (false, false);
         self.uncut.clear();
         self.surface
             .files
@@ -363,6 +368,7 @@ impl SurfaceBuilder {
     /// The first triangle and vertex number without a vertex, as [`SurfaceError::NoSuchVertex`].
     pub fn end_file(&mut self) -> Result<(), SurfaceError> {
         self.cut_late()?;
+        self.join_groups()?;
         if !self.by_position {
             let map = &self.file2vert;
             for (i, triangle) in
@@ -403,6 +409,7 @@ impl SurfaceBuilder {
             surface.notes.push(Note { file, kind: NoteKind::UnusedVertices { n: n_unused } });
         }
         drop_unused_labels(&mut surface);
+        surface.name_label_sets(0);
         surface
     }
 }
@@ -430,29 +437,4 @@ pub(super) fn drop_unused_points(surface: &mut Surface) -> u64 {
         }
     }
     n_unused as u64
-}
-
-/// Keeps the labels that triangles carry, in their order.
-pub(super) fn drop_unused_labels(surface: &mut Surface) {
-    let mut used = vec![false; surface.label_names.len()];
-    for &label in &surface.labels {
-        used[label as usize] = true;
-    }
-    if used.iter().all(|&u| u) {
-        return;
-    }
-    let mut next = 0;
-    let new_ids: Vec<u32> = used
-        .iter()
-        .map(|&u| {
-            let id = next;
-            next += u32::from(u);
-            id
-        })
-        .collect();
-    let mut keep = used.iter();
-    surface.label_names.retain(|_| *keep.next().expect("one flag per label"));
-    for label in &mut surface.labels {
-        *label = new_ids[*label as usize];
-    }
 }

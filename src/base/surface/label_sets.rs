@@ -1,0 +1,209 @@
+//! Labels of triangles in several groups: each combination of groups that occurs is a label of its own.
+
+use super::{Surface, SurfaceBuilder, SurfaceError};
+use tetdb_schema::labels::{self, LabelSet};
+
+/// Stands between the names of the groups in the name of a label for several.
+const TOGETHER: &str = "+";
+/// Bytes a triangle takes while repeated ones are looked for.
+const JOIN_BYTES: u64 = 16;
+
+impl Surface {
+    /// Labels of the groups that triangles with this label belong to: itself, unless it stands for several.
+    pub fn label_members<'a>(&'a self, label: &'a u32) -> &'a [u32] {
+        labels::members(&self.label_sets, label)
+    }
+
+    /// Adds sets of labels whose numbers count from `first`.
+    pub(super) fn add_label_sets(&mut self, first: u32, sets: &[LabelSet]) {
+        let moved = |set: &LabelSet| LabelSet {
+            label: first + set.label,
+            members: set.members.iter().map(|m| first + m).collect(),
+        };
+        self.label_sets.extend(sets.iter().map(moved));
+        self.name_label_sets(first);
+    }
+
+    /// Names the labels for several from `first` on: the names of the groups, joined. One that has a `+` itself is quoted. A name that is
+    /// taken gets a number.
+    pub(super) fn name_label_sets(&mut self, first: u32) {
+        for set in self.label_sets.iter().filter(|set| set.label >= first) {
+            let name = |&member: &u32| match &self.label_names[member as usize] {
+                name if name.contains(TOGETHER) => format!("\"{name}\""),
+                name => name.clone(),
+            };
+            let wanted = set.members.iter().map(name).collect::<Vec<_>>().join(TOGETHER);
+            self.label_names[set.label as usize].clear();
+            let numbered = (2..).map(|n| format!("{wanted}~{n}"));
+            let mut names = std::iter::once(wanted.clone()).chain(numbered);
+            let free = names.find(|name| !self.label_names.contains(name));
+            self.label_names[set.label as usize] = free.expect("one number is free");
+        }
+    }
+}
+
+impl SurfaceBuilder {
+    /// The label of triangles in all groups of these labels, of which there is one at least.
+    pub fn label_of_all(&mut self, labels: &[u32]) -> u32 {
+        let sets = &self.surface.label_sets;
+        let mut members: Vec<u32> =
+            labels.iter().flat_map(|label| labels::members(sets, label)).copied().collect();
+        members.sort_unstable();
+        members.dedup();
+        if let [label] = members[..] {
+            return label;
+        }
+        if let Some(&label) = self.set_ids.get(&members) {
+            return label;
+        }
+        // It gets its name when all names are known.
+        let label = self.surface.label_names.len() as u32;
+        self.surface.label_names.push(String::new());
+        self.surface.label_sets.push(LabelSet { label, members: members.clone() });
+        self.set_ids.insert(members, label);
+        label
+    }
+
+    /// Makes one triangle of those that this file lists once for each of their groups.
+    pub fn join_groups_at_end(&mut self) {
+        self.joins_groups = true;
+    }
+
+    /// Joins triangles of the same vertices and direction that differ in their labels; one with all labels stays, in the first place.
+    pub(super) fn join_groups(&mut self) -> Result<(), SurfaceError> {
+        let own = self.triangle_first..self.surface.triangles.len();
+        let labels = &self.surface.labels[own.clone()];
+        if !self.joins_groups || labels.iter().all(|label| *label == labels[0]) {
+            return Ok(());
+        }
+        self.check_more(JOIN_BYTES * own.len() as u64)?;
+        let key = |t: usize| {
+            let [a, b, c] = self.surface.triangles[t];
+            let [a, b, c] = match a.min(b).min(c) {
+                low if low == a => [a, b, c],
+                low if low == b => [b, c, a],
+                _ => [c, a, b],
+            };
+            [a, b, c, t as u32]
+        };
+        let mut keys: Vec<[u32; 4]> = own.map(key).collect();
+        keys.sort_unstable();
+        let mut is_gone = vec![false; self.surface.triangles.len()];
+        let mut joined = Vec::new();
+        for same in keys.chunk_by(|a, b| a[..3] == b[..3]).filter(|same| same.len() > 1) {
+            let first = same[0][3] as usize;
+            let mut labels = vec![self.surface.labels[first]];
+            for &[.., t] in &same[1..] {
+                let label = self.surface.labels[t as usize];
+                // A triangle twice in one group is for validation to report.
+                if !labels.contains(&label) {
+                    labels.push(label);
+                    is_gone[t as usize] = true;
+                }
+            }
+            if labels.len() > 1 {
+                joined.push((first, labels));
+            }
+        }
+        joined.sort_unstable();
+        for (first, labels) in joined {
+            self.surface.labels[first] = self.label_of_all(&labels);
+        }
+        let mut gone = is_gone.iter();
+        self.surface.triangles.retain(|_| gone.next() == Some(&false));
+        let mut gone = is_gone.iter();
+        self.surface.labels.retain(|_| gone.next() == Some(&false));
+        Ok(())
+    }
+}
+
+/// Keeps the labels that triangles have, and the members of those, in their order.
+pub(super) fn drop_unused_labels(surface: &mut Surface) {
+    let mut used = vec![false; surface.label_names.len()];
+    for &label in &surface.labels {
+        used[label as usize] = true;
+    }
+    surface.label_sets.retain(|set| used[set.label as usize]);
+    for &member in surface.label_sets.iter().flat_map(|set| &set.members) {
+        used[member as usize] = true;
+    }
+    if used.iter().all(|&u| u) {
+        return;
+    }
+    let mut next = 0;
+    let number = |&is_used: &bool| {
+        next += u32::from(is_used);
+        next - u32::from(is_used)
+    };
+    let new_ids: Vec<u32> = used.iter().map(number).collect();
+    let mut keep = used.iter();
+    surface.label_names.retain(|_| *keep.next().expect("one flag per label"));
+    let sets = surface.label_sets.iter_mut();
+    let of_sets = sets.flat_map(|set| std::iter::once(&mut set.label).chain(&mut set.members));
+    for label in surface.labels.iter_mut().chain(of_sets) {
+        *label = new_ids[*label as usize];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Point;
+
+    /// A tetrahedron whose sides are listed once for each of their groups.
+    fn listed(sides: &[([u32; 3], &str)]) -> Surface {
+        let mut builder = SurfaceBuilder::new();
+        builder.begin_file("t");
+        builder.join_groups_at_end();
+        for p in [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]] {
+            builder.vertex(Point::from_array(p)).unwrap();
+        }
+        for &(corners, name) in sides {
+            let label = builder.label(name);
+            builder.triangle(corners, label).unwrap();
+        }
+        builder.end_file().unwrap();
+        builder.finish()
+    }
+
+    #[test]
+    fn repeated_triangles_become_one_with_all_labels() {
+        let all = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+        let mut sides: Vec<([u32; 3], &str)> = all.map(|t| (t, "walls")).to_vec();
+        // Behind all others, and with another corner first.
+        sides.extend([([1, 3, 0], "in"), ([0, 2, 1], "in"), ([0, 2, 1], "a+b")]);
+        let surface = listed(&sides);
+        assert_eq!(surface.triangles, all);
+        assert_eq!(surface.label_names, ["walls", "in", "a+b", "walls+in+\"a+b\"", "walls+in"]);
+        assert_eq!(surface.labels, [3, 4, 0, 0]);
+        assert_eq!(surface.label_members(&3), [0, 1, 2]);
+        // Twice in one group, and a wall of two directions, stay as they are.
+        assert_eq!(listed(&[(all[0], "a"), (all[0], "a"), (all[1], "b")]).n_triangles(), 3);
+        assert_eq!(listed(&[(all[0], "a"), ([0, 1, 2], "b")]).n_triangles(), 2);
+    }
+
+    #[test]
+    fn names_that_are_taken_get_a_number_and_unused_labels_go() {
+        let mut builder = SurfaceBuilder::new();
+        builder.begin_file("t");
+        let [a, b, c] = ["a", "b", "c"].map(|name| builder.label(name));
+        let ab = builder.label_of_all(&[b, a, b]);
+        assert_eq!(builder.label_of_all(&[ab, a]), ab);
+        assert_eq!(builder.label_of_all(&[c, c]), c);
+        builder.label_of_all(&[a, c]);
+        let plain = builder.label("a+b");
+        for label in [ab, plain] {
+            builder.triangle_at([Point::ZERO, Point::X, Point::Y], label).unwrap();
+        }
+        builder.end_file().unwrap();
+        let surface = builder.finish();
+        assert_eq!(surface.label_names, ["a", "b", "a+b~2", "a+b"]);
+        assert_eq!(surface.label_sets, [LabelSet { label: 2, members: vec![0, 1] }]);
+        let mut whole = Surface::default();
+        whole.embed(&surface, "s").unwrap();
+        assert_eq!(whole.label_names, ["s:a", "s:b", "s:a+s:b", "s:a+b"]);
+        assert_eq!(whole.labels, [2, 3]);
+        whole.embed(&surface.part(false), "s").unwrap();
+        assert_eq!(whole.label_members(&6), [4, 5]);
+    }
+}
