@@ -1,5 +1,7 @@
 //! Labels of triangles in several groups: each combination of groups that occurs is a label of its own.
 
+use std::collections::HashMap;
+
 use super::{Surface, SurfaceBuilder, SurfaceError};
 use tetdb_schema::labels::{self, LabelSet};
 
@@ -12,6 +14,33 @@ impl Surface {
     /// Labels of the groups that triangles with this label belong to: itself, unless it stands for several.
     pub fn label_members<'a>(&'a self, label: &'a u32) -> &'a [u32] {
         labels::members(&self.label_sets, label)
+    }
+
+    /// Puts the triangles of a label into several groups, for each of these labels by its name. Effects: renumbers labels.
+    pub fn divide_labels(&mut self, groups: &[(&str, &[&str])]) {
+        let groups: HashMap<&str, &[&str]> = groups.iter().copied().collect();
+        let old = std::mem::take(&mut self.label_names);
+        let old_sets = std::mem::take(&mut self.label_sets);
+        let mut builder = SurfaceBuilder::new();
+        let mut known: HashMap<u32, u32> = HashMap::new();
+        let mut new = |label: &mut u32| {
+            *label = *known.entry(*label).or_insert_with(|| {
+                let names =
+                    labels::members(&old_sets, label).iter().map(|&m| old[m as usize].as_str());
+                let names = match groups.get(old[*label as usize].as_str()) {
+                    Some(groups) => groups.to_vec(),
+                    None => names.collect(),
+                };
+                let labels: Vec<u32> = names.iter().map(|name| builder.label(name)).collect();
+                builder.label_of_all(&labels)
+            });
+        };
+        self.labels.iter_mut().for_each(&mut new);
+        self.embedded.edges.iter_mut().for_each(|[.., label]| new(label));
+        self.embedded.points.iter_mut().for_each(|[.., label]| new(label));
+        self.label_names = builder.surface.label_names;
+        self.label_sets = builder.surface.label_sets;
+        self.name_label_sets(0);
     }
 
     /// Adds sets of labels whose numbers count from `first`.
@@ -205,5 +234,11 @@ mod tests {
         assert_eq!(whole.labels, [2, 3]);
         whole.embed(&surface.part(false), "s").unwrap();
         assert_eq!(whole.label_members(&6), [4, 5]);
+        let mut divided = surface.clone();
+        divided.divide_labels(&[("a+b", &["z", "b"])]);
+        assert_eq!(divided.label_names, ["a", "b", "a+b", "z", "b+z"]);
+        assert_eq!((&divided.labels[..], divided.label_members(&4)), (&[2, 4][..], &[1, 3][..]));
+        divided.divide_labels(&[]);
+        assert_eq!(divided.label_names, ["a", "b", "a+b", "z", "b+z"]);
     }
 }
