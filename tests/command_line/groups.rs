@@ -146,3 +146,54 @@ fn copies_and_sheets_keep_the_groups() {
     // A length at a label holds for triangles of several groups too.
     place.run_line("mesh a.msh -o fine.tetdb --size-region inlet,0.1").succeeds();
 }
+
+#[test]
+fn exports_keep_the_groups_or_say_so() {
+    let place = Place::new();
+    place.write("a.msh", msh41());
+    place.run_line("mesh a.msh -o a.tetdb --hsiz 0.3 --subdomains 2").succeeds();
+    let bytes = |name: &str| std::fs::read(place.path(name)).expect("it was written");
+    let text = |name: &str| String::from_utf8_lossy(&bytes(name)).into_owned();
+    for line in ["back.msh", "back_text.msh --text", "one.msh --region 1"] {
+        place.run_line(&format!("export a.tetdb {line}")).succeeds();
+        let name = line.split(' ').next().expect("a name");
+        let check = place.run_line(&format!("check {name} --json")).succeeds().json();
+        check_labels(&check, false);
+        assert_eq!(check["triangles"], 12, "{name}");
+    }
+    let physical = text("back_text.msh");
+    assert!(
+        physical.contains("2 1 \"walls\"\n2 2 \"inlet\"\n2 4 \"lid, outer\"\n3 1"),
+        "{physical}"
+    );
+    for name in ["a.vtu", "a.vtkhdf"] {
+        place.run_line(&format!("export a.tetdb {name}")).succeeds();
+        let boundary = text(&name.replace("a.", "a_boundary."));
+        for group in ["group_walls", "group_inlet", "group_lid__outer"] {
+            assert!(boundary.contains(group), "{name}: {group}");
+        }
+    }
+    place.run_line("export a.tetdb a.inp").succeeds();
+    let deck = text("a.inp");
+    let sides = |name: &str| {
+        let (_, rest) =
+            deck.split_once(&format!("*SURFACE, TYPE=ELEMENT, NAME={name}\n")).expect("a surface");
+        rest.lines().take_while(|line| !line.starts_with('*')).count()
+    };
+    assert_eq!([sides("walls"), sides("inlet"), sides("lid__outer")], [12, 2, 2]);
+    assert_eq!(deck.matches("*NSET, NSET=").count(), 4);
+    place.run_line("export a.tetdb a.mfem").succeeds();
+    let sets = text("a.mfem");
+    assert!(sets.contains("\"inlet\"\n1\n3\n") && sets.contains("\"walls\"\n3\n1 3 5\n"), "{sets}");
+    place.run_line("export a.tetdb foam/a.foam").succeeds();
+    let patches = text("foam/constant/polyMesh/boundary");
+    assert!(patches.contains("inGroups        2(group_walls group_inlet);"), "{patches}");
+    for name in ["a.msh22", "a.mesh", "a.npy", "a.node"] {
+        let said = place.run_line(&format!("export a.tetdb {name}")).succeeds().stderr();
+        assert!(said.contains("such as walls+inlet"), "{name}: {said}");
+    }
+    // Without triangles of several groups nothing changes.
+    place.run_line("sample box,h=0.5 -o plain.off").succeeds();
+    place.run_line("mesh plain.off -o plain.tetdb --export plain.vtu").succeeds();
+    assert!(!text("plain_boundary.vtu").contains("group_"));
+}
