@@ -2,13 +2,13 @@
 
 use std::collections::HashMap;
 
-use super::{Surface, SurfaceBuilder, SurfaceError};
+use super::Surface;
 use tetdb_schema::labels::{self, LabelSet};
 
 /// Stands between the names of the groups in the name of a label for several.
 const TOGETHER: &str = "+";
 /// Bytes a triangle takes while repeated ones are looked for.
-const JOIN_BYTES: u64 = 16;
+pub(super) const JOIN_BYTES: u64 = 17;
 
 impl Surface {
     /// Labels of the groups that triangles with this label belong to: itself, unless it stands for several.
@@ -21,7 +21,7 @@ impl Surface {
         let groups: HashMap<&str, &[&str]> = groups.iter().copied().collect();
         let old = std::mem::take(&mut self.label_names);
         let old_sets = std::mem::take(&mut self.label_sets);
-        let mut builder = SurfaceBuilder::new();
+        let (mut made, mut numbers) = (Self::default(), LabelNumbers::default());
         let mut known: HashMap<u32, u32> = HashMap::new();
         let mut new = |label: &mut u32| {
             *label = *known.entry(*label).or_insert_with(|| {
@@ -31,15 +31,16 @@ impl Surface {
                     Some(groups) => groups.to_vec(),
                     None => names.collect(),
                 };
-                let labels: Vec<u32> = names.iter().map(|name| builder.label(name)).collect();
-                builder.label_of_all(&labels)
+                let labels: Vec<u32> =
+                    names.iter().map(|name| numbers.label(&mut made, name)).collect();
+                numbers.label_of_all(&mut made, &labels)
             });
         };
         self.labels.iter_mut().for_each(&mut new);
         self.embedded.edges.iter_mut().for_each(|[.., label]| new(label));
         self.embedded.points.iter_mut().for_each(|[.., label]| new(label));
-        self.label_names = builder.surface.label_names;
-        self.label_sets = builder.surface.label_sets;
+        self.label_names = made.label_names;
+        self.label_sets = made.label_sets;
         self.name_label_sets(0);
     }
 
@@ -71,10 +72,28 @@ impl Surface {
     }
 }
 
-impl SurfaceBuilder {
-    /// The label of triangles in all groups of these labels, of which there is one at least.
-    pub fn label_of_all(&mut self, labels: &[u32]) -> u32 {
-        let sets = &self.surface.label_sets;
+/// The labels of a surface that is being built, by name and by members.
+#[derive(Default)]
+pub(super) struct LabelNumbers {
+    ids: HashMap<String, u32>,
+    sets: HashMap<Vec<u32>, u32>,
+}
+
+impl LabelNumbers {
+    /// The label of that name, which is added if new.
+    pub fn label(&mut self, surface: &mut Surface, name: &str) -> u32 {
+        if let Some(&id) = self.ids.get(name) {
+            return id;
+        }
+        let id = surface.label_names.len() as u32;
+        surface.label_names.push(name.to_owned());
+        self.ids.insert(name.to_owned(), id);
+        id
+    }
+
+    /// The label of triangles in all groups of these labels. It gets its name when all names are known.
+    pub fn label_of_all(&mut self, surface: &mut Surface, labels: &[u32]) -> u32 {
+        let sets = &surface.label_sets;
         let mut members: Vec<u32> =
             labels.iter().flat_map(|label| labels::members(sets, label)).copied().collect();
         members.sort_unstable();
@@ -82,32 +101,22 @@ impl SurfaceBuilder {
         if let [label] = members[..] {
             return label;
         }
-        if let Some(&label) = self.set_ids.get(&members) {
+        if let Some(&label) = self.sets.get(&members) {
             return label;
         }
-        // It gets its name when all names are known.
-        let label = self.surface.label_names.len() as u32;
-        self.surface.label_names.push(String::new());
-        self.surface.label_sets.push(LabelSet { label, members: members.clone() });
-        self.set_ids.insert(members, label);
+        let label = surface.label_names.len() as u32;
+        surface.label_names.push(String::new());
+        surface.label_sets.push(LabelSet { label, members: members.clone() });
+        self.sets.insert(members, label);
         label
     }
 
-    /// Makes one triangle of those that this file lists once for each of their groups.
-    pub fn join_groups_at_end(&mut self) {
-        self.joins_groups = true;
-    }
-
-    /// Joins triangles of the same vertices and direction that differ in their labels; one with all labels stays, in the first place.
-    pub(super) fn join_groups(&mut self) -> Result<(), SurfaceError> {
-        let own = self.triangle_first..self.surface.triangles.len();
-        let labels = &self.surface.labels[own.clone()];
-        if !self.joins_groups || labels.iter().all(|label| *label == labels[0]) {
-            return Ok(());
-        }
-        self.check_more(JOIN_BYTES * own.len() as u64)?;
+    /// Joins triangles from `first` on that have the same vertices and direction, and differ in their labels; one with all labels
+    /// stays, in the first place. Memory: [`JOIN_BYTES`] for each.
+    pub fn join_triangles(&mut self, surface: &mut Surface, first: usize) {
+        let own = first..surface.triangles.len();
         let key = |t: usize| {
-            let [a, b, c] = self.surface.triangles[t];
+            let [a, b, c] = surface.triangles[t];
             let [a, b, c] = match a.min(b).min(c) {
                 low if low == a => [a, b, c],
                 low if low == b => [b, c, a],
@@ -117,13 +126,13 @@ impl SurfaceBuilder {
         };
         let mut keys: Vec<[u32; 4]> = own.map(key).collect();
         keys.sort_unstable();
-        let mut is_gone = vec![false; self.surface.triangles.len()];
+        let mut is_gone = vec![false; surface.triangles.len()];
         let mut joined = Vec::new();
         for same in keys.chunk_by(|a, b| a[..3] == b[..3]).filter(|same| same.len() > 1) {
             let first = same[0][3] as usize;
-            let mut labels = vec![self.surface.labels[first]];
+            let mut labels = vec![surface.labels[first]];
             for &[.., t] in &same[1..] {
-                let label = self.surface.labels[t as usize];
+                let label = surface.labels[t as usize];
                 // A triangle twice in one group is for validation to report.
                 if !labels.contains(&label) {
                     labels.push(label);
@@ -136,13 +145,12 @@ impl SurfaceBuilder {
         }
         joined.sort_unstable();
         for (first, labels) in joined {
-            self.surface.labels[first] = self.label_of_all(&labels);
+            surface.labels[first] = self.label_of_all(surface, &labels);
         }
         let mut gone = is_gone.iter();
-        self.surface.triangles.retain(|_| gone.next() == Some(&false));
+        surface.triangles.retain(|_| gone.next() == Some(&false));
         let mut gone = is_gone.iter();
-        self.surface.labels.retain(|_| gone.next() == Some(&false));
-        Ok(())
+        surface.labels.retain(|_| gone.next() == Some(&false));
     }
 }
 
@@ -178,6 +186,7 @@ pub(super) fn drop_unused_labels(surface: &mut Surface) {
 mod tests {
     use super::*;
     use crate::geom::Point;
+    use crate::surface::SurfaceBuilder;
 
     /// A tetrahedron whose sides are listed once for each of their groups.
     fn listed(sides: &[([u32; 3], &str)]) -> Surface {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::label_sets::drop_unused_labels;
+use super::label_sets::{JOIN_BYTES, LabelNumbers, drop_unused_labels};
 use super::polygon::{cut_facet, cut_polygon};
 use super::vertex_table::VertexTable;
 use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
@@ -16,15 +16,13 @@ use crate::storage::{filled, push};
 /// their vertices. Same calls, same surface: nothing depends on hash order.
 #[derive(Default)]
 pub struct SurfaceBuilder {
-    pub(super) surface: Surface,
+    surface: Surface,
     table: VertexTable,
-    label_ids: HashMap<String, u32>,
-    /// Labels that stand for several, by their members.
-    pub(super) set_ids: HashMap<Vec<u32>, u32>,
+    labels: LabelNumbers,
     /// Triangles listed in several groups are to become one each.
-    pub(super) joins_groups: bool,
+    joins_groups: bool,
     file: String,
-    pub(super) triangle_first: usize,
+    triangle_first: usize,
     /// Vertices, notes and seeds before this file.
     before: [usize; 3],
     /// Vertex of the file -> welded vertex.
@@ -144,13 +142,26 @@ impl SurfaceBuilder {
 
     /// The id of the label `name`, which is added if new.
     pub fn label(&mut self, name: &str) -> u32 {
-        if let Some(&id) = self.label_ids.get(name) {
-            return id;
+        self.labels.label(&mut self.surface, name)
+    }
+
+    /// The label of triangles in all groups of these labels, of which there is one at least.
+    pub fn label_of_all(&mut self, labels: &[u32]) -> u32 {
+        self.labels.label_of_all(&mut self.surface, labels)
+    }
+
+    /// Makes one triangle of those that this file lists once for each of their groups.
+    pub fn join_groups_at_end(&mut self) {
+        self.joins_groups = true;
+    }
+
+    fn join_groups(&mut self) -> Result<(), SurfaceError> {
+        let labels = &self.surface.labels[self.triangle_first..];
+        if self.joins_groups && labels.iter().any(|label| *label != labels[0]) {
+            self.check_more(JOIN_BYTES * labels.len() as u64)?;
+            self.labels.join_triangles(&mut self.surface, self.triangle_first);
         }
-        let id = self.surface.label_names.len() as u32;
-        self.surface.label_names.push(name.to_owned());
-        self.label_ids.insert(name.to_owned(), id);
-        id
+        Ok(())
     }
 
     /// Adds a triangle of vertices of the file.
