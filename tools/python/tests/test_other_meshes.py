@@ -232,7 +232,7 @@ def test_cell_sets_of_meshio_may_overlap() -> None:
     both = meshio.Mesh(np.vstack([CUBE, TET]), blocks, cell_sets={"a": [np.array([0]), np.array([1])], "b": [np.array([0, 1]), None]})
     assert names_of(quiet(both)) == {"a": [0, 1, 13], "b": [0, 1, 2, 3], "surface": [*range(4, 13), 14, 15]}
     volume = meshio.Mesh(CUBE, [("hexahedron", HEXAHEDRON)], cell_sets={"rock": [np.array([0])], "wet": [np.array([0])]})
-    assert set(quiet(volume, "1 volume cells are in several sets", "").labels) == {"rock"}
+    assert set(quiet(volume, "1 volume cells are in several sets").labels) == {"rock"}
 
 
 def test_labels_may_be_several_names(tmp_path: Any) -> None:
