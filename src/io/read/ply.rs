@@ -45,7 +45,7 @@ impl Scalar {
         })
     }
 
-    fn is_whole(self) -> bool {
+    fn is_integer(self) -> bool {
         !matches!(self, Self::F32 | Self::F64)
     }
 
@@ -297,7 +297,7 @@ impl<R: BufRead> PlyReader<R> {
         if n > 0 && element.properties.iter().filter(|p| is_corners(p)).count() != 1 {
             return Err(self.feed.unexpected("a face property `vertex_indices`", b"none"));
         }
-        let is_number = |p: &&Property| p.count.is_none() && p.value.is_whole();
+        let is_number = |p: &&Property| p.count.is_none() && p.value.is_integer();
         let own = element.properties.iter().filter(is_number).map(|p| p.name.as_str());
         let own: Vec<&str> = own.filter(|name| !COLORS.contains(name)).collect();
         if n > 0 && !own.is_empty() {
