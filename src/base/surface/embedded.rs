@@ -63,7 +63,7 @@ impl Surface {
         name: &str,
         scratch: &ScratchSpace,
     ) -> Result<(), SurfaceError> {
-        let first = self.add_labels(&other.label_names, name);
+        let first = self.add_labels(&other.label_names, &[], name);
         self.push_embedded(other, |label| first + label, scratch)?;
         self.add_support_triangles(scratch)
     }
@@ -170,7 +170,7 @@ impl Surface {
         plain.drop_support_triangles();
         plain.embedded = Embedded::default();
         super::weld::drop_unused_points(&mut plain);
-        super::weld::drop_unused_labels(&mut plain);
+        super::label_sets::drop_unused_labels(&mut plain);
         plain
     }
 

@@ -6,6 +6,7 @@ use std::mem::size_of;
 use super::Seed;
 use super::embedded_set::Embedded;
 use crate::geom::{Aabb, Point};
+use tetdb_schema::labels::LabelSet;
 
 /// An indexed triangle surface with a label on each triangle.
 ///
@@ -24,6 +25,8 @@ pub struct Surface {
     pub labels: Vec<u32>,
     /// Names of the labels.
     pub label_names: Vec<String>,
+    /// Labels of triangles in several groups, ascending.
+    pub label_sets: Vec<LabelSet>,
     /// The files read, in order.
     pub files: Vec<SourceFile>,
     /// True if each triangle is part of an embedded sheet; empty where none is.
@@ -173,7 +176,7 @@ pub enum NoteKind {
         /// Number of regions.
         n: u64,
     },
-    /// Groups some of whose faces belong to another group too, which gives them their label.
+    /// Groups some of whose volumes belong to another group too, which gives them their name.
     OtherGroups {
         /// Names of the groups.
         names: String,
@@ -259,7 +262,7 @@ impl fmt::Display for Note {
             }
             NoteKind::OtherGroups { names } => write!(
                 f,
-                "faces of the groups {names} belong to another group before, and have its label"
+                "volumes of the groups {names} belong to another group before, and have its name"
             ),
             NoteKind::TrailingBytes { n } => {
                 write!(f, "{n} bytes behind the declared content were left out")

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::label_sets::{JOIN_BYTES, LabelNumbers, drop_unused_labels};
 use super::polygon::{cut_facet, cut_polygon};
 use super::vertex_table::VertexTable;
 use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
@@ -17,7 +18,9 @@ use crate::storage::{filled, push};
 pub struct SurfaceBuilder {
     surface: Surface,
     table: VertexTable,
-    label_ids: HashMap<String, u32>,
+    labels: LabelNumbers,
+    /// Triangles listed in several groups are to become one each.
+    joins_groups: bool,
     file: String,
     triangle_first: usize,
     /// Vertices, notes and seeds before this file.
@@ -82,7 +85,7 @@ impl SurfaceBuilder {
         self.before = [surface.points.len(), surface.notes.len(), surface.seeds.len()];
         self.file2vert.clear();
         (self.n_welded, self.n_fanned, self.n_cut, self.n_repeated) = (0, 0, 0, 0);
-        self.by_position = false;
+        (self.by_position, self.joins_groups) = (false, false);
         self.uncut.clear();
         self.surface
             .files
@@ -139,13 +142,26 @@ impl SurfaceBuilder {
 
     /// The id of the label `name`, which is added if new.
     pub fn label(&mut self, name: &str) -> u32 {
-        if let Some(&id) = self.label_ids.get(name) {
-            return id;
+        self.labels.label(&mut self.surface, name)
+    }
+
+    /// The label of triangles in all groups of these labels, of which there is one at least.
+    pub fn label_of_all(&mut self, labels: &[u32]) -> u32 {
+        self.labels.label_of_all(&mut self.surface, labels)
+    }
+
+    /// Makes one triangle of those that this file lists once for each of their groups.
+    pub fn join_groups_at_end(&mut self) {
+        self.joins_groups = true;
+    }
+
+    fn join_groups(&mut self) -> Result<(), SurfaceError> {
+        let labels = &self.surface.labels[self.triangle_first..];
+        if self.joins_groups && labels.iter().any(|label| *label != labels[0]) {
+            self.check_more(JOIN_BYTES * labels.len() as u64)?;
+            self.labels.join_triangles(&mut self.surface, self.triangle_first);
         }
-        let id = self.surface.label_names.len() as u32;
-        self.surface.label_names.push(name.to_owned());
-        self.label_ids.insert(name.to_owned(), id);
-        id
+        Ok(())
     }
 
     /// Adds a triangle of vertices of the file.
@@ -363,6 +379,7 @@ impl SurfaceBuilder {
     /// The first triangle and vertex number without a vertex, as [`SurfaceError::NoSuchVertex`].
     pub fn end_file(&mut self) -> Result<(), SurfaceError> {
         self.cut_late()?;
+        self.join_groups()?;
         if !self.by_position {
             let map = &self.file2vert;
             for (i, triangle) in
@@ -403,6 +420,7 @@ impl SurfaceBuilder {
             surface.notes.push(Note { file, kind: NoteKind::UnusedVertices { n: n_unused } });
         }
         drop_unused_labels(&mut surface);
+        surface.name_label_sets(0);
         surface
     }
 }
@@ -430,29 +448,4 @@ pub(super) fn drop_unused_points(surface: &mut Surface) -> u64 {
         }
     }
     n_unused as u64
-}
-
-/// Keeps the labels that triangles carry, in their order.
-pub(super) fn drop_unused_labels(surface: &mut Surface) {
-    let mut used = vec![false; surface.label_names.len()];
-    for &label in &surface.labels {
-        used[label as usize] = true;
-    }
-    if used.iter().all(|&u| u) {
-        return;
-    }
-    let mut next = 0;
-    let new_ids: Vec<u32> = used
-        .iter()
-        .map(|&u| {
-            let id = next;
-            next += u32::from(u);
-            id
-        })
-        .collect();
-    let mut keep = used.iter();
-    surface.label_names.retain(|_| *keep.next().expect("one flag per label"));
-    for label in &mut surface.labels {
-        *label = new_ids[*label as usize];
-    }
 }

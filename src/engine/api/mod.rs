@@ -123,6 +123,7 @@ pub use tetdb_kernel::samples::PREFIX as SAMPLE_PREFIX;
 pub use tetdb_kernel::sizing::SizeWarning;
 pub use tetdb_schema::catalog::{QualityRow, StoreState};
 pub use tetdb_schema::code::Code;
+pub use tetdb_schema::labels::LabelSet;
 pub use tetdb_schema::source::BOUNDARY_OF as BOUNDARY_PREFIX;
 pub use tetdb_schema::word::Word;
 pub use tetdb_store::audit::{Population, Qualities};

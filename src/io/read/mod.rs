@@ -6,7 +6,9 @@
 //! become doubles exactly. Polygons are cut into triangles, vertices with identical bits
 //! are one.
 
+mod abaqus;
 mod cells;
+mod element_sets;
 mod embedded;
 mod embedded_sink;
 mod error;
@@ -293,7 +295,7 @@ fn read_feed<R: BufRead>(
         Format::TetgenEle => cells::read_ele(feed, nodes, limit, target),
         Format::TetgenSmesh => tetgen::read(feed, tetgen::FacetLayout::Smesh, nodes, limit, target),
         Format::Vtk => vtk::read_surface(feed, target),
-        Format::Abaqus => fem::read_abaqus(feed, target),
+        Format::Abaqus => abaqus::read_abaqus(feed, target),
         Format::Nastran => fem::read_nastran(feed, target),
         Format::Unv => unv::read_unv(feed, target),
         Format::VtkXml => vtk_xml::read(feed, limit, target),

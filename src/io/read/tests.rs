@@ -2,6 +2,7 @@
 
 mod fem;
 mod gmsh;
+mod groups;
 mod indexed;
 mod losses;
 mod medit;

@@ -59,7 +59,8 @@ impl Surface {
         };
         made(py, move || {
             let labels = labels.as_ref().map(|(names, codes)| named(names, codes));
-            tetdb::Surface::from_arrays(&points, &triangles, labels.as_deref())
+            let surface = tetdb::Surface::from_arrays(&points, &triangles, labels.as_deref())?;
+            grouped(surface)
         })
     }
 
@@ -85,7 +86,7 @@ impl Surface {
             let cells = CellArrays { counts: &counts, corners: &corners, names: labels.as_deref() };
             let surface = match is_volume {
                 true => tetdb::Surface::boundary_of_cells(&points, cells)?,
-                false => tetdb::Surface::from_polygons(&points, cells)?,
+                false => grouped(tetdb::Surface::from_polygons(&points, cells)?)?,
             };
             Ok(notes.into_iter().fold(surface, tetdb::Surface::noted))
         })
@@ -117,6 +118,11 @@ impl Surface {
 
     fn triangles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u32>> {
         rows(py, bytemuck::cast_slice(self.inner.triangles()), 3)
+    }
+
+    /// Labels of triangles in several groups, and the labels of those.
+    fn label_sets(&self) -> Vec<(u32, Vec<u32>)> {
+        self.inner.label_sets().iter().map(|set| (set.label, set.members.clone())).collect()
     }
 
     /// Names, and for each triangle a position among them.
@@ -265,6 +271,20 @@ pub enum EdgesGiven<'py> {
 pub enum PointsGiven<'py> {
     File(PathBuf),
     Arrays(PyReadonlyArray2<'py, f64>, Option<Vec<String>>),
+}
+
+/// Stands between the names of the groups of a triangle that is in several.
+const TOGETHER: char = '\u{1f}';
+
+/// The surface with triangles in all groups that their labels name.
+fn grouped(surface: tetdb::Surface) -> Result<tetdb::Surface, tetdb::Error> {
+    let names: Vec<String> =
+        surface.labels().iter().filter(|name| name.contains(TOGETHER)).cloned().collect();
+    let groups: Vec<(&str, Vec<&str>)> =
+        names.iter().map(|name| (name.as_str(), name.split(TOGETHER).collect())).collect();
+    let groups: Vec<(&str, &[&str])> =
+        groups.iter().map(|(name, groups)| (*name, groups.as_slice())).collect();
+    surface.with_groups(&groups)
 }
 
 fn named<'a>(names: &'a [String], codes: &[i64]) -> Vec<&'a str> {

@@ -9,6 +9,7 @@ use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{EnclosedVolumes, OUTSIDE, Seeker, Surface};
 use tetdb_kernel::boundary::{BoundaryError, Filled};
 use tetdb_kernel::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError};
+use tetdb_schema::labels::labels_within;
 
 /// Share of the box diagonal below which a seed counts as on the surface. The side of a seed comes from sums of doubles, with an
 /// error of some 1e-16 of the diagonal, and a thousand times more where triangles are steep.
@@ -59,7 +60,8 @@ fn find(
     let name = which.strip_prefix("label:").unwrap_or(which);
     let label = surface.label_names.iter().position(|known| known == name);
     let label = label.ok_or_else(unknown)?;
-    for v in domain.volumes.enclosed_by(surface, label as u32) {
+    let labels = labels_within(&surface.label_sets, label as u32);
+    for v in domain.volumes.enclosed_by(surface, &labels) {
         is_here[v as usize] = filled[v as usize];
     }
     match is_here.contains(&true) {

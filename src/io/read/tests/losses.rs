@@ -158,7 +158,8 @@ fn unv_groups_of_all_versions() {
         let with_rod = mesh.replace("1 91 1", &format!("{rod}1 91 1"));
         noted(Format::Unv, with_rod, &["1 beams"]);
     }
-    noted(Format::Unv, group("2432", &pairs.replace("8 4", "8 3")), &["groups high"]);
+    let both = noted(Format::Unv, group("2432", &pairs.replace("8 4", "8 3")), &[]);
+    assert_eq!(both.label_names, ["low", "high", "low+high", "part"]);
     assert_eq!(
         refuse(Format::Unv, group("2467", &fours.replace("\n8 3 0 0", ""))).0,
         "unexpected-text"

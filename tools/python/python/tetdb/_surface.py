@@ -97,7 +97,7 @@ class Surface:
     triangles : (m, 3) int array
         Positions in `points`, counter-clockwise seen from outside or all the other way.
     labels : (m,) array of str or int, optional
-        The label of each triangle, or of each surface cell of a mesh.
+        The label of each triangle, or of each surface cell of a mesh; a list or tuple of them for one in several groups.
 
     Notes
     -----
@@ -187,9 +187,21 @@ class Surface:
 
     @property
     def labels(self) -> npt.NDArray[np.str_]:
-        """(m,) str: the label of each triangle."""
+        """(m,) str: the label of each triangle; for one in several groups their names with ``+`` between them."""
         names, codes = self._inner.labels()
         return np.array(names, dtype=np.str_)[codes]
+
+    @property
+    def groups(self) -> dict[str, npt.NDArray[np.int64]]:
+        """Numbers of the triangles in each group; one may be in several. ``{name: [rows]}`` of it are cell sets of meshio."""
+        names, codes = self._inner.labels()
+        sets = dict(self._inner.label_sets())
+        found: dict[str, npt.NDArray[np.int64]] = {}
+        for label, name in enumerate(names):
+            if label not in sets:
+                having = [label, *(one for one, members in sets.items() if label in members)]
+                found[name] = np.flatnonzero(np.isin(codes, having))
+        return found
 
     @property
     def notes(self) -> list[str]:
@@ -341,7 +353,11 @@ class Surface:
     def __reduce__(self) -> tuple[Any, ...]:
         if self._parts:
             return self._parts
-        return Surface._again, (self.points, self.triangles, self.labels, *self._inner.extras())
+        names, codes = self._inner.labels()
+        for label, members in self._inner.label_sets():
+            names[label] = _cells.TOGETHER.join(names[m] for m in members)
+        words = np.array(names, dtype=np.str_)[codes]
+        return Surface._again, (self.points, self.triangles, words, *self._inner.extras())
 
     def __repr__(self) -> str:
         return f"<tetdb.Surface: {self.n_points} points, {self.n_triangles} triangles>"
