@@ -48,6 +48,7 @@ pub fn sizes_of(args: &SizeArgs) -> OptionsText {
         size_sphere,
         size_cylinder,
         size_region,
+        size_label,
         size_field,
         size_expr,
     } = args.clone();
@@ -60,6 +61,7 @@ pub fn sizes_of(args: &SizeArgs) -> OptionsText {
         size_sphere,
         size_cylinder,
         size_region,
+        size_label,
         size_expr,
         size_field,
         ..OptionsText::default()

@@ -46,6 +46,8 @@ fn estimates_come_true() {
         "sample:box,h=0.2 --size-sphere 0.5,0.5,0.5,0.2,0.02",
         "sample:box,h=0.2 --size-expr 0.03+0.3*abs(x-0.5)",
         "sample:shells,count=2,h=0.2 --regions all --size-region 2,0.06",
+        "sample:shells,count=2,h=0.2 --regions all --size-label shell-2,0.05",
+        "sample:shells,count=2,h=0.2 --size-label shell-2,0.06,10%",
     ]
     .into_iter()
     .enumerate()
@@ -131,6 +133,56 @@ fn regions_have_sizes_of_their_own() {
         let message = error["message"].as_str().unwrap_or_default();
         assert!(message.contains(named), "{option}: {message}");
         assert!(!place.path("bad.tetdb").exists());
+    }
+}
+
+#[test]
+fn lengths_near_a_label_follow_it() {
+    let place = Place::new();
+    place.run_line("sample faults,cells=8 -o rock.obj").succeeds();
+    let inside = "--embed rock_sheets.obj --name rock_sheets.obj=f";
+    for (k, (surface, label, options)) in [
+        ("sample:shells,count=2,h=0.3", "shell-2", "--size-label shell-2,0.08"),
+        ("sample:shells,count=2,h=0.3,kind=boxes", "shell-1", "--size-label shell-1,2%,3%"),
+        (&format!("rock.obj {inside}"), "f:fault-1", "--size-label f:fault-1,0.03 --threads 1"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let tets = |store: &str, label: &str| {
+            let line = format!("query {store} --label {label} --json");
+            let text = place.run_line(&line).succeeds().stdout();
+            text.lines().filter(|line| line.contains("\"id\"")).count()
+        };
+        let mut found = Vec::new();
+        for (name, options) in [("plain", ""), ("near", options)] {
+            let store = format!("{k}{name}.tetdb");
+            let line = format!("mesh {surface} {options} --refine-surface -o {store}");
+            place.run_line(&line).succeeds();
+            found.push(tets(&store, label));
+        }
+        assert!(found[1] >= 4 * found[0], "{surface}: {found:?}");
+    }
+    let (store, info) = ("1near.tetdb", "info 1near.tetdb --json");
+    let recorded = place.run_line(info).succeeds().stdout();
+    assert!(recorded.contains("shell-1,2%,3%"), "{store}: {recorded}");
+    place
+        .write("job.toml", "size_label = [[\"shell-1\", \"2%\", \"3%\"]]\nrefine_surface = true\n");
+    let line =
+        "mesh sample:shells,count=2,h=0.3,kind=boxes --config job.toml --memory 64MiB -o c.tetdb";
+    place.run_line(line).succeeds();
+    assert_eq!(place.digest("c.tetdb"), place.digest(store));
+    for (asked, named) in [
+        ("--size-label=shell,0.1", "shell-1, shell-2"),
+        ("--size-label=shell-1", "LABEL,H,DISTANCE"),
+        ("--size-label=shell-1,-0.1", "-0.1"),
+    ] {
+        let line = format!("mesh sample:shells,count=2,h=0.3 -o bad.tetdb --json {asked}");
+        let done = place.run_line(&line);
+        let error = done.error();
+        assert_eq!((error["code"].as_str(), done.exit()), (Some("bad-size"), Some(2)), "{asked}");
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.contains(named), "{asked}: {message}");
     }
 }
 

@@ -54,6 +54,9 @@ pub struct SizeArgs {
     /// Edge length in a region, by its number in `tetdb info` or a label of triangles around it; may be repeated
     #[arg(long, value_name = "REGION_OR_LABEL,H", allow_hyphen_values = true)]
     pub size_region: Vec<String>,
+    /// Edge length on triangles with a label, growing away from them, or from DISTANCE on; may be repeated
+    #[arg(long, value_name = "LABEL,H[,DISTANCE]", allow_hyphen_values = true)]
+    pub size_label: Vec<String>,
     /// Edge lengths at the vertices of a mesh: a MEDIT .sol with its background .mesh of tetrahedra beside it, or with one length for each of the surface's vertices
     #[arg(long, value_name = "FILE")]
     pub size_field: Option<String>,

@@ -7,7 +7,9 @@ use super::Error;
 use super::field_arrays::{FieldArrays, IN_STORE};
 use crate::pipeline::SizeFile;
 use tetdb_base::geom::Point;
-use tetdb_kernel::sizing::{Formula, Length, RegionSize, SizeOptions, SizeSource, SourceShape};
+use tetdb_kernel::sizing::{
+    Formula, LabelSize, Length, RegionSize, SizeOptions, SizeSource, SourceShape,
+};
 
 /// Wanted edge lengths: the lengths of the surface's own edges, and the sizes given here. The least of all counts.
 ///
@@ -88,6 +90,12 @@ impl Sizes {
         self
     }
 
+    /// Wants at most `h` on the triangles of a label and up to `distance` from them; from there lengths grow.
+    pub fn near_label(mut self, label: &str, h: Length, distance: Option<Length>) -> Self {
+        self.sizes.labels.push(LabelSize { label: label.trim().to_owned(), h, distance });
+        self
+    }
+
     /// Adds a length as an expression in x, y and z, such as `0.06 + 0.1*abs(z)`.
     pub fn expression(mut self, text: &str) -> Self {
         self.expression = Some(text.to_owned());
@@ -155,12 +163,14 @@ mod tests {
             .in_sphere([0.5, -1e-7, 0.0], 0.1, Length::units(0.01), None)
             .in_cylinder([0.0; 3], [1.0; 3], 0.25, Length::units(0.1), None)
             .expression("x + 1")
-            .in_region("rock, wet", Length::units(0.25));
+            .in_region("rock, wet", Length::units(0.25))
+            .near_label("7,3", Length::units(0.25), None);
         let options = sizes.options().expect("good sizes");
         let text = OptionsText::from_sizes(&options, None);
         assert_eq!(text.hsiz.as_deref(), Some("2%"));
         assert_eq!(text.size_sphere, ["0.5,-0.0000001,0,0.1,0.01"]);
         assert_eq!(text.size_region, ["rock, wet,0.25"]);
+        assert_eq!(text.size_label, ["7,3,0.25,0"]);
         assert_eq!(text.sizes(), Ok(options));
         for bad in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
             let bad = Length::units(bad);

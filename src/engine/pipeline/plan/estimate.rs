@@ -16,7 +16,8 @@ use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface, VOLUMES_TRIANGLE};
 use tetdb_kernel::boundary::{Filled, RegionPolicy};
 use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::{
-    Background, Domain, ExtraSizes, Region, SizeConstraint, SizeField, SizeSummary, TetCounts,
+    Background, Domain, ExtraSizes, NearLabel, Region, SizeConstraint, SizeField, SizeSummary,
+    TetCounts,
 };
 use tetdb_store::sealed::Form;
 
@@ -152,9 +153,11 @@ fn prepare_in(
     }
     let requested = &options.mesh.sizes;
     let isolated_points = surface.isolated_points();
+    let labels = NearLabel::all(surface, requested, scratch)?;
     let built = |regions: &[Region]| {
         let mut constraints: Vec<&dyn SizeConstraint> =
             regions.iter().map(|r| r as &dyn SizeConstraint).collect();
+        constraints.extend(labels.iter().map(|near| near as &dyn SizeConstraint));
         let mut at_vertices = None;
         match background {
             Some(Background::Mesh(mesh)) => constraints.push(&**mesh),

@@ -8,7 +8,7 @@ use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{EnclosedVolumes, OUTSIDE, Seeker, Surface};
 use tetdb_kernel::boundary::{BoundaryError, Filled};
-use tetdb_kernel::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError};
+use tetdb_kernel::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError, list_of_labels};
 
 /// Share of the box diagonal below which a seed counts as on the surface. The side of a seed comes from sums of doubles, with an
 /// error of some 1e-16 of the diagonal, and a thousand times more where triangles are steep.
@@ -69,13 +69,7 @@ fn find(
 }
 
 fn unknown(which: &str, surface: &Surface, n_regions: usize) -> SizingError {
-    /// Largest number of names listed in the message.
-    const LISTED: usize = 12;
-    let names = &surface.label_names;
-    let mut list = names[..names.len().min(LISTED)].join(", ");
-    if names.len() > LISTED {
-        list += ", …";
-    }
+    let list = list_of_labels(surface);
     SizingError::BadRegion {
         found: which.to_owned(),
         expected: format!(

@@ -60,7 +60,7 @@ def mesh(
         Wanted, least and greatest edge length inside: in the surface's units, or ``"2%"`` of the diagonal of its box.
     hgrad : float, optional
         Greatest ratio of neighboring edge lengths. Default: 1.3.
-    size : Box, Sphere, Cylinder, InRegion, Field, Function, callable, str, path, or a list of them, optional
+    size : Box, Sphere, Cylinder, InRegion, NearLabel, Field, Function, callable, str, path, or a list of them, optional
         Where edges are shorter. Of everything that applies the least length counts. A callable takes points (k, 3) and returns lengths
         (k,); it is asked once, on a regular grid (see :class:`Function`), and what it said is kept in the store.
     regions : {"parity", "all", "outer", "by-orientation", "seeds", "all-but-holes"}, optional
