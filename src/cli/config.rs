@@ -4,7 +4,7 @@ use std::path::Path;
 use tetdb_engine::api::error::Error;
 use tetdb_engine::api::{Code, MeshOptions, OptionsText, Seed, SeedKind, Word, read_seeds, typed};
 
-use super::args::{ShapeArgs, SizeArgs};
+use super::args::{InsideArgs, ShapeArgs, SizeArgs};
 use super::failure::Failure;
 
 /// Keys of a recorded job that no file of options has.
@@ -68,6 +68,16 @@ pub fn sizes_of(args: &SizeArgs) -> OptionsText {
     }
 }
 
+/// The treatment of what is inside, given on the command line.
+pub fn inside_of(args: &InsideArgs) -> OptionsText {
+    let InsideArgs { snap_embedded, embed_outside } = args;
+    OptionsText {
+        snap_embedded: snap_embedded.clone(),
+        embed_outside: embed_outside.map(|outside| outside.word().to_owned()),
+        ..OptionsText::default()
+    }
+}
+
 /// All options given on the command line. Errors: the file of seeds, with its line.
 fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
     // As in `sizes_of`.
@@ -75,8 +85,7 @@ fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
         sizes,
         config: _,
         refine_surface,
-        snap_embedded,
-        embed_outside,
+        inside,
         regions,
         region_seed,
         hole,
@@ -97,9 +106,7 @@ fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
         seal: seal.map(|seal| seal.word().to_owned()),
         keep_stages: *keep_stages,
         refine_surface: *refine_surface,
-        snap_embedded: snap_embedded.clone(),
-        embed_outside: embed_outside.map(|outside| outside.word().to_owned()),
-        ..sizes_of(sizes)
+        ..inside_of(inside).overridden_by(sizes_of(sizes))
     };
     if let Some(path) = file_of_seeds {
         for seed in seeds(path)? {

@@ -12,6 +12,18 @@ pub fn short(x: f64) -> String {
     }
 }
 
+/// A count with its noun: `1 label`, `2 labels`.
+pub fn count(n: u64, what: &str) -> String {
+    match n {
+        1 => format!("1 {what}"),
+        n => match what {
+            "tetrahedron" => format!("{n} tetrahedra"),
+            "vertex" => format!("{n} vertices"),
+            _ => format!("{n} {what}s"),
+        },
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::short;

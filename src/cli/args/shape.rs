@@ -65,6 +65,19 @@ pub struct SizeArgs {
     pub size_expr: Option<String>,
 }
 
+/// Treatment of embedded edges and points.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Inside the surface")]
+pub struct InsideArgs {
+    /// Move embedded points and ends of embedded edges onto triangles nearer than this, and divide the triangles there: a length, or 1%
+    /// of the box diagonal
+    #[arg(long, value_name = "DIST", allow_hyphen_values = true)]
+    pub snap_embedded: Option<String>,
+    /// Treatment of embedded points and edges outside the filled regions [default: error]
+    #[arg(long, value_name = "HOW", value_parser = word_of::<EmbedOutside>(OUTSIDE))]
+    pub embed_outside: Option<EmbedOutside>,
+}
+
 /// What shapes the mesh, besides the surface.
 #[derive(Debug, clap::Args)]
 pub struct ShapeArgs {
@@ -77,18 +90,8 @@ pub struct ShapeArgs {
     /// without moving the surface
     #[arg(long, help_heading = "Sizes")]
     pub refine_surface: bool,
-    /// Move embedded points and ends of embedded edges onto triangles nearer than this, and divide the triangles there: a length, or 1%
-    /// of the box diagonal
-    #[arg(
-        long,
-        value_name = "DIST",
-        allow_hyphen_values = true,
-        help_heading = "Inside the surface"
-    )]
-    pub snap_embedded: Option<String>,
-    /// Treatment of embedded points and edges outside the filled regions [default: error]
-    #[arg(long, value_name = "HOW", value_parser = word_of::<EmbedOutside>(OUTSIDE), help_heading = "Inside the surface")]
-    pub embed_outside: Option<EmbedOutside>,
+    #[command(flatten)]
+    pub inside: InsideArgs,
     /// Which regions to fill [default: what the surface's files say, else parity; with seeds or holes: seeds]
     #[arg(long, value_name = "RULE", value_parser = word_of::<Regions>(REGIONS), help_heading = "Regions")]
     pub regions: Option<Regions>,

@@ -236,6 +236,7 @@ impl Surface {
         }
         let wires = &mut self.inner.embedded;
         leave_out(&mut wires.edges, edges);
+        leave_out(&mut wires.point_lines, points);
         leave_out(&mut wires.points, points);
         if !self.inner.has_embedded() {
             self.inner = self.inner.without_embedded();

@@ -197,6 +197,19 @@ impl OuterEmbedded {
     }
 }
 
+/// Refuses sheets, embedded edges and embedded points outside the regions that `options` fill. Errors: as [`outer_embedded`].
+pub fn refuse_outer(
+    surface: &Surface,
+    options: &Options,
+    scratch: &ScratchSpace,
+) -> Result<(), PipelineError> {
+    let seeker = Seeker::with_filter(surface, scratch, |_| true);
+    let volumes = EnclosedVolumes::new_in(&seeker, scratch);
+    let chosen = chosen(&seeker, &volumes, options)?;
+    refuse_outer_sheets(surface, &volumes, &chosen)?;
+    OuterEmbedded::find(surface, &seeker, &volumes, &chosen).refuse(surface, scratch)
+}
+
 /// Finds embedded edges and points outside the regions that `options` fill. Errors: seeds that fit no region.
 pub fn outer_embedded(
     surface: &Surface,
