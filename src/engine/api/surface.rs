@@ -119,7 +119,7 @@ pub(super) fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<()
 impl Surface {
     /// Reads files as one surface. Each file is one label, unless the file has labels of its own.
     ///
-    /// Formats: STL, PLY, OBJ, OFF, MEDIT, Gmsh and TetGen, also compressed as `.gz` or `.zst`, and pipes.
+    /// Formats: STL, PLY, OBJ, OFF, 3MF, GIFTI, MEDIT, Gmsh, TetGen, VTK, Abaqus, Nastran and I-DEAS, also compressed as `.gz` or `.zst`, and pipes.
     ///
     /// Errors: a file that cannot be read, with the line or byte.
     pub fn read<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> Result<Self, Error> {

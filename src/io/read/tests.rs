@@ -5,6 +5,7 @@ mod gmsh;
 mod indexed;
 mod losses;
 mod medit;
+mod packed_xml;
 mod ply;
 mod stl;
 mod tetgen;

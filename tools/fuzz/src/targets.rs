@@ -52,6 +52,8 @@ pub const TARGETS: &[Target] = &[
     reader("gmsh", Format::Gmsh, |bytes| read(Format::Gmsh, bytes)),
     reader("smesh", Format::TetgenSmesh, |bytes| read(Format::TetgenSmesh, bytes)),
     reader("poly", Format::TetgenPoly, |bytes| read(Format::TetgenPoly, bytes)),
+    reader("3mf", Format::ThreeMf, |bytes| read(Format::ThreeMf, bytes)),
+    reader("gii", Format::Gifti, |bytes| read(Format::Gifti, bytes)),
     text("expr", expression),
     text("config", config),
     text("option", option),
