@@ -242,10 +242,10 @@ fn expressions_that_are_no_sizes_are_named() {
 fn a_shape_names_its_bad_number_and_help_fits_the_fault() {
     let place = Place::new();
     for (asked, parts) in [
-        ("--size-sphere 1.5,0,0,5%,2%", ["in it 5%", "coordinates and radii"]),
-        ("--size-box 0,0,0,1,1,x,0.1", ["in it x", "coordinates and radii"]),
+        ("--size-sphere 1.5,0,5%,1,2%", ["in it 5%", "coordinates are numbers"]),
+        ("--size-box 0,0,0,1,1,x,0.1", ["in it x", "coordinates are numbers"]),
         ("--size-cylinder 0,0,0,1,1,1,1,-2", ["in it -2", "lengths above zero"]),
-        ("--size-sphere 1,2,3", ["X,Y,Z,R,H", "coordinates and radii"]),
+        ("--size-sphere 1,2,3", ["X,Y,Z,R,H", "coordinates are numbers"]),
         ("--size-region 5,0.1", ["5", "name a region"]),
         ("--size-expr x", ["size-expr x is", "everywhere in the surface's box"]),
         ("--hsiz 5mm", ["5mm", "share of its box diagonal"]),

@@ -5,7 +5,7 @@ use std::mem::size_of;
 
 use super::Seed;
 use super::embedded_set::Embedded;
-use crate::geom::{Aabb, Point};
+use crate::geom::{Aabb, Point, count};
 
 /// An indexed triangle surface with a label on each triangle.
 ///
@@ -209,35 +209,65 @@ pub enum VolumePoints {
     Regions,
 }
 
+/// The verb of a count.
+fn was(n: u64) -> &'static str {
+    if n == 1 { "was" } else { "were" }
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.file.is_empty() {
             write!(f, "{}: ", self.file)?;
         }
+        let of = |n: u64, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
         match &self.kind {
             NoteKind::MissingEndsolid { line } => {
                 write!(f, "the text ends at line {line} without `endsolid`; all facets were read")
             }
             NoteKind::WeldedVertices { n } => {
-                write!(f, "{n} vertices repeat the coordinates of another and were joined to it")
+                write!(
+                    f,
+                    "{} the coordinates of another and {} joined to it",
+                    of(*n, "vertex repeats", "vertices repeat"),
+                    was(*n)
+                )
             }
             NoteKind::UnusedVertices { n } => {
-                write!(f, "{n} vertices belong to no triangle and were left out")
+                write!(
+                    f,
+                    "{} to no triangle and {} left out",
+                    of(*n, "vertex belongs", "vertices belong"),
+                    was(*n)
+                )
             }
             NoteKind::FannedPolygons { n } => {
-                write!(f, "{n} polygons were cut into triangles from their first vertex")
+                write!(
+                    f,
+                    "{} cut into triangles from the first vertex",
+                    of(*n, "polygon was", "polygons were")
+                )
             }
             NoteKind::RepeatedCorners { n } => {
-                write!(f, "{n} polygons repeat a corner, which was left out")
+                write!(
+                    f,
+                    "{} a corner, which was left out",
+                    of(*n, "polygon repeats", "polygons repeat")
+                )
             }
             NoteKind::CutPolygons { n } => {
                 write!(
                     f,
-                    "{n} polygons with dents or corners in line were cut into the triangles of their plane"
+                    "{} with dents or corners in line {} cut into the triangles of the plane",
+                    of(*n, "polygon", "polygons"),
+                    was(*n)
                 )
             }
             NoteKind::SkippedElements { what, n } => {
-                write!(f, "{n} {what} were left out; only the surface is read")
+                write!(
+                    f,
+                    "{} left out; only the surface is read",
+                    of(*n, &format!("of the {what} was"), &format!("{what} were"))
+                )
             }
             NoteKind::VolumePoints { points, n } => {
                 let (what, use_of) = match points {
@@ -248,13 +278,16 @@ impl fmt::Display for Note {
             }
             NoteKind::BoundaryOfCells { n } => write!(
                 f,
-                "the boundary of {n} volume cells, and faces between their regions, are the surface"
+                "the boundary of {}, and faces between regions, are the surface",
+                count(*n, "volume cell")
             ),
             NoteKind::Said(text) => f.write_str(text),
             NoteKind::MixedRegions { n } => {
                 write!(
                     f,
-                    "{n} regions hold elements of several groups with no triangles between them, and get no name"
+                    "{} elements of several groups with no triangles between them, and {} no name",
+                    of(*n, "region holds", "regions hold"),
+                    if *n == 1 { "gets" } else { "get" }
                 )
             }
             NoteKind::OtherGroups { names } => write!(
@@ -262,18 +295,37 @@ impl fmt::Display for Note {
                 "faces of the groups {names} belong to another group before, and have its label"
             ),
             NoteKind::TrailingBytes { n } => {
-                write!(f, "{n} bytes behind the declared content were left out")
+                write!(
+                    f,
+                    "{} behind the declared content {} left out",
+                    of(*n, "byte", "bytes"),
+                    was(*n)
+                )
             }
             NoteKind::CurvedFaces { n } => {
-                write!(f, "{n} curved faces were taken as flat ones between their corners")
+                write!(
+                    f,
+                    "{} flat between the corners",
+                    of(*n, "curved face was taken as", "curved faces were taken as")
+                )
             }
             NoteKind::CutFacets { n } => {
-                write!(f, "{n} facets of several polygons or with holes were cut as a whole")
+                write!(
+                    f,
+                    "{} of several polygons or with holes {} cut as a whole",
+                    of(*n, "facet", "facets"),
+                    was(*n)
+                )
             }
             NoteKind::Edges { n } => {
                 write!(
                     f,
-                    "{n} polygons of two corners are edges, embedded where the surface is meshed"
+                    "{} embedded where the surface is meshed",
+                    of(
+                        *n,
+                        "polygon of two corners is an edge,",
+                        "polygons of two corners are edges,"
+                    )
                 )
             }
         }

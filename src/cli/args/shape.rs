@@ -45,7 +45,7 @@ pub struct SizeArgs {
     /// Edge length in a box, and at most OUTSIDE away from it; may be repeated
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1,H[,OUTSIDE]", allow_hyphen_values = true)]
     pub size_box: Vec<String>,
-    /// Edge length in a sphere, and at most OUTSIDE away from it; may be repeated
+    /// Edge length in a sphere, and at most OUTSIDE away from it; R may be a share such as 2%; may be repeated
     #[arg(long, value_name = "X,Y,Z,R,H[,OUTSIDE]", allow_hyphen_values = true)]
     pub size_sphere: Vec<String>,
     /// Edge length in a cylinder around the axis between two points; may be repeated
@@ -57,7 +57,7 @@ pub struct SizeArgs {
     /// Edge length on triangles with a label, growing away from them, or from DISTANCE on; may be repeated
     #[arg(long, value_name = "LABEL,H[,DISTANCE]", allow_hyphen_values = true)]
     pub size_label: Vec<String>,
-    /// Edge lengths at the vertices of a mesh: a MEDIT .sol with its background .mesh of tetrahedra beside it, or with one length for each of the surface's vertices
+    /// Edge lengths at the vertices of a mesh: a MEDIT .sol with its background .mesh of tetrahedra beside it, or with one length for each of the surface's vertices; or .csv, .npy, .msh, .vtu, .mtr
     #[arg(long, value_name = "FILE")]
     pub size_field: Option<String>,
     /// Edge length as an expression in x, y and z, such as 'max(0.02, 0.1*sqrt(x^2+y^2))'

@@ -130,7 +130,7 @@ impl From<SizingError> for Error {
             SizingError::BadValue {
                 option: "size_box" | "size_sphere" | "size_cylinder", ..
             } => {
-                "coordinates and radii are numbers in the surface's own unit; only lengths of edges can also be shares, such as 1%"
+                "coordinates are numbers in the surface's own unit; radii and lengths of edges can also be shares, such as 1%"
             }
             SizingError::BadRegion { .. } | SizingError::BadValue { option: "size_region", .. } => {
                 "name a region by its number or name, or by a label of triangles around it, then a comma and a length such as 0.5 or 1%"

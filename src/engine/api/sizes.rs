@@ -68,7 +68,7 @@ impl Sizes {
         outside: Option<Length>,
     ) -> Self {
         let center = Point::from_array(center);
-        self.with_shape(SourceShape::Sphere { center, radius }, h, outside)
+        self.with_shape(SourceShape::Sphere { center, radius: Length::Units(radius) }, h, outside)
     }
 
     /// Wants `h` in a cylinder around the axis from `a` to `b`. Outside the cylinder, lengths grow, or are at most `outside`.
@@ -81,7 +81,7 @@ impl Sizes {
         outside: Option<Length>,
     ) -> Self {
         let ends = [a, b].map(Point::from_array);
-        self.with_shape(SourceShape::Cylinder { ends, radius }, h, outside)
+        self.with_shape(SourceShape::Cylinder { ends, radius: Length::Units(radius) }, h, outside)
     }
 
     /// Wants at most `h` in a region, given by its number, its name or a label on it.

@@ -358,8 +358,10 @@ impl Surface {
     pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.inner.notes.iter().map(ToString::to_string).collect();
         if self.turned > 0 {
-            notes
-                .push(format!("{} triangles were turned to run like their neighbors", self.turned));
+            notes.push(match self.turned {
+                1 => "1 triangle was turned to run like its neighbors".to_owned(),
+                n => format!("{n} triangles were turned to run like their neighbors"),
+            });
         }
         notes
     }

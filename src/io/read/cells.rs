@@ -59,12 +59,18 @@ impl SurfaceSink<'_> {
         if n > 0 {
             self.builder.note(NoteKind::BoundaryOfCells { n });
         }
-        for (n, what) in [
-            (n_faces, "surface cells were left out; the boundary of the volume cells is read"),
-            (n_curved, "cells have nodes on their edges; they were taken by their corners alone"),
+        for (n, one, many, what) in [
+            (
+                n_faces,
+                "surface cell was",
+                "surface cells were",
+                "left out; the boundary of the volume cells is read",
+            ),
+            (n_curved, "cell has", "cells have", "nodes on edges; only corners were taken"),
         ] {
             if n > 0 {
-                self.builder.note(NoteKind::Said(format!("{n} {what}")));
+                let subject = if n == 1 { one } else { many };
+                self.builder.note(NoteKind::Said(format!("{n} {subject} {what}")));
             }
         }
         Ok(())

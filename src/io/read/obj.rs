@@ -141,8 +141,12 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         target.builder.note(NoteKind::Said(what));
     }
     if let Some((word, Spot::Line(line))) = unknown {
-        let left_out = "lines of no known kind were left out, the first one";
-        let what = format!("{n_unknown} {left_out} {word} in line {line}");
+        let what = match n_unknown {
+            1 => format!("a line of no known kind was left out: {word} in line {line}"),
+            n => format!(
+                "{n} lines of no known kind were left out, the first one {word} in line {line}"
+            ),
+        };
         target.builder.note(NoteKind::Said(what));
     }
     let known = target.builder.n_file_vertices() as u32;

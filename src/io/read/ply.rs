@@ -108,7 +108,9 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
 
 /// Notes elements that are neither vertices nor faces.
 fn note_skipped(element: &str, n: u64, target: &mut SurfaceSink) {
-    let what = format!("{n} records of the element {} were left out", quote(element.as_bytes()));
+    let records = if n == 1 { "record" } else { "records" };
+    let was = if n == 1 { "was" } else { "were" };
+    let what = format!("{n} {records} of the element {} {was} left out", quote(element.as_bytes()));
     match (n, element) {
         (0, _) => {}
         (_, "edge") => target.builder.note(NoteKind::SkippedElements { what: "edges", n }),

@@ -212,11 +212,13 @@ fn notes(chosen: &Filled, options: &Options, n: u32) -> Vec<String> {
     let (unnamed, empty) = (filled - chosen.names.len(), n as usize - filled);
     let mut notes = Vec::new();
     if !chosen.names.is_empty() && unnamed > 0 {
-        notes.push(format!("{unnamed} of {filled} filled regions have no name"));
+        let has = if unnamed == 1 { "has" } else { "have" };
+        notes.push(format!("{unnamed} of {filled} filled regions {has} no name"));
     }
     let policy = options.mesh.regions.policy;
     if matches!(policy, RegionPolicy::Seeds | RegionPolicy::AllButHoles) && empty > 0 {
-        notes.push(format!("{empty} of {n} regions stay empty: no seed is inside, or a hole"));
+        let stays = if empty == 1 { "stays" } else { "stay" };
+        notes.push(format!("{empty} of {n} regions {stays} empty: no seed is inside, or a hole"));
     }
     notes
 }

@@ -44,7 +44,7 @@ fn elements_beside_faces_are_noted() {
     noted(
         Format::Ply,
         head("element polygon 1\nproperty list uchar int v") + "3 0 1 2\n",
-        &["1 records of the element `polygon`"],
+        &["1 record of the element `polygon` was left out"],
     );
     noted(Format::Ply, head("element edge 0\nproperty int vertex1"), &[]);
     noted(Format::Medit, MEDIT, &["1 edges", "1 tetrahedra"]);

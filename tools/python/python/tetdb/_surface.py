@@ -145,7 +145,7 @@ class Surface:
 
     @classmethod
     def read(cls, *files: str | os.PathLike[str]) -> Surface:
-        """Reads files as one surface: STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen; each a label unless it has its own."""
+        """Reads files as one surface: STL, PLY, OBJ, OFF, 3MF, GIFTI, MEDIT, Gmsh, TetGen and others; each a label unless it has its own."""
         return cls._of(_native.Surface.read([os.fspath(f) for f in files]))
 
     @classmethod
