@@ -5,7 +5,7 @@ use std::mem::size_of;
 
 use super::Seed;
 use super::embedded_set::Embedded;
-use crate::geom::{Aabb, Point, count};
+use crate::geom::{Aabb, Point, counted};
 
 /// An indexed triangle surface with a label on each triangle.
 ///
@@ -209,9 +209,48 @@ pub enum VolumePoints {
     Regions,
 }
 
-/// The verb of a count.
-fn was(n: u64) -> &'static str {
-    if n == 1 { "was" } else { "were" }
+impl NoteKind {
+    /// A count, and a sentence about it for [`counted`].
+    fn sentence(&self) -> Option<(u64, &'static str)> {
+        Some(match self {
+            Self::WeldedVertices { n } => (
+                *n,
+                "[vertex repeats|vertices repeat] the coordinates of another and [was|were] joined to it",
+            ),
+            Self::UnusedVertices { n } => {
+                (*n, "[vertex belongs|vertices belong] to no triangle and [was|were] left out")
+            }
+            Self::FannedPolygons { n } => {
+                (*n, "[polygon was|polygons were] cut into triangles from the first vertex")
+            }
+            Self::RepeatedCorners { n } => {
+                (*n, "[polygon repeats|polygons repeat] a corner, which was left out")
+            }
+            Self::CutPolygons { n } => (
+                *n,
+                "[polygon|polygons] with dents or corners in line [was|were] cut into the triangles of the plane",
+            ),
+            Self::MixedRegions { n } => (
+                *n,
+                "[region holds|regions hold] elements of several groups with no triangles between them, and [gets|get] no name",
+            ),
+            Self::TrailingBytes { n } => {
+                (*n, "[byte|bytes] behind the declared content [was|were] left out")
+            }
+            Self::CurvedFaces { n } => (
+                *n,
+                "[curved face was taken as a flat one|curved faces were taken as flat ones] between the corners",
+            ),
+            Self::CutFacets { n } => {
+                (*n, "[facet|facets] of several polygons or with holes [was|were] cut as a whole")
+            }
+            Self::Edges { n } => (
+                *n,
+                "[polygon of two corners is an edge|polygons of two corners are edges], embedded where the surface is meshed",
+            ),
+            _ => return None,
+        })
+    }
 }
 
 impl fmt::Display for Note {
@@ -219,55 +258,17 @@ impl fmt::Display for Note {
         if !self.file.is_empty() {
             write!(f, "{}: ", self.file)?;
         }
-        let of = |n: u64, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
+        if let Some((n, sentence)) = self.kind.sentence() {
+            return f.write_str(&counted(n, sentence));
+        }
         match &self.kind {
             NoteKind::MissingEndsolid { line } => {
                 write!(f, "the text ends at line {line} without `endsolid`; all facets were read")
             }
-            NoteKind::WeldedVertices { n } => {
-                write!(
-                    f,
-                    "{} the coordinates of another and {} joined to it",
-                    of(*n, "vertex repeats", "vertices repeat"),
-                    was(*n)
-                )
-            }
-            NoteKind::UnusedVertices { n } => {
-                write!(
-                    f,
-                    "{} to no triangle and {} left out",
-                    of(*n, "vertex belongs", "vertices belong"),
-                    was(*n)
-                )
-            }
-            NoteKind::FannedPolygons { n } => {
-                write!(
-                    f,
-                    "{} cut into triangles from the first vertex",
-                    of(*n, "polygon was", "polygons were")
-                )
-            }
-            NoteKind::RepeatedCorners { n } => {
-                write!(
-                    f,
-                    "{} a corner, which was left out",
-                    of(*n, "polygon repeats", "polygons repeat")
-                )
-            }
-            NoteKind::CutPolygons { n } => {
-                write!(
-                    f,
-                    "{} with dents or corners in line {} cut into the triangles of the plane",
-                    of(*n, "polygon", "polygons"),
-                    was(*n)
-                )
-            }
             NoteKind::SkippedElements { what, n } => {
-                write!(
-                    f,
-                    "{} left out; only the surface is read",
-                    of(*n, &format!("of the {what} was"), &format!("{what} were"))
-                )
+                let words = if *n == 1 { "of the " } else { "" };
+                let was = if *n == 1 { "was" } else { "were" };
+                write!(f, "{n} {words}{what} {was} left out; only the surface is read")
             }
             NoteKind::VolumePoints { points, n } => {
                 let (what, use_of) = match points {
@@ -276,58 +277,16 @@ impl fmt::Display for Note {
                 };
                 write!(f, "{what} ({n}) {use_of}, unless another rule fills regions")
             }
-            NoteKind::BoundaryOfCells { n } => write!(
-                f,
-                "the boundary of {}, and faces between regions, are the surface",
-                count(*n, "volume cell")
-            ),
-            NoteKind::Said(text) => f.write_str(text),
-            NoteKind::MixedRegions { n } => {
-                write!(
-                    f,
-                    "{} elements of several groups with no triangles between them, and {} no name",
-                    of(*n, "region holds", "regions hold"),
-                    if *n == 1 { "gets" } else { "get" }
-                )
+            NoteKind::BoundaryOfCells { n } => {
+                let cells = counted(*n, "volume [cell|cells]");
+                write!(f, "the boundary of {cells}, and faces between regions, are the surface")
             }
             NoteKind::OtherGroups { names } => write!(
                 f,
                 "faces of the groups {names} belong to another group before, and have its label"
             ),
-            NoteKind::TrailingBytes { n } => {
-                write!(
-                    f,
-                    "{} behind the declared content {} left out",
-                    of(*n, "byte", "bytes"),
-                    was(*n)
-                )
-            }
-            NoteKind::CurvedFaces { n } => {
-                write!(
-                    f,
-                    "{} flat between the corners",
-                    of(*n, "curved face was taken as", "curved faces were taken as")
-                )
-            }
-            NoteKind::CutFacets { n } => {
-                write!(
-                    f,
-                    "{} of several polygons or with holes {} cut as a whole",
-                    of(*n, "facet", "facets"),
-                    was(*n)
-                )
-            }
-            NoteKind::Edges { n } => {
-                write!(
-                    f,
-                    "{} embedded where the surface is meshed",
-                    of(
-                        *n,
-                        "polygon of two corners is an edge,",
-                        "polygons of two corners are edges,"
-                    )
-                )
-            }
+            NoteKind::Said(text) => f.write_str(text),
+            _ => Ok(()),
         }
     }
 }

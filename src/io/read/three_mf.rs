@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::{BufRead, Cursor, Read};
 
 use super::feed::{Feed, check_point, name};
-use super::three_mf_model::{Content, Model, Placed};
+use super::three_mf_model::{Model, ObjectContent, Placed};
 use super::{FilePlace, ReadError, ReadFault, Result, Spot, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
@@ -125,8 +125,8 @@ impl Package {
             false => model.items.clone(),
             true => model.unplaced(),
         };
-        let mut labels = Labels::default();
-        labels.is_alone = self.models.values().map(Model::n_meshes).sum::<usize>() == 1;
+        let n_meshes = self.models.values().map(Model::n_meshes).sum::<usize>();
+        let mut labels = Labels { is_alone: n_meshes == 1, ..Labels::default() };
         let (mut used, mut n_placed) = (HashSet::new(), 0);
         // The last one is placed first: the stack is reversed.
         let mut stack: Vec<(Placed, String, String, usize)> = Vec::new();
@@ -153,11 +153,11 @@ impl Package {
             let named = if own.is_empty() { named } else { own };
             match &object.content {
                 _ if object.is_support => {}
-                Content::Mesh { points, triangles } => {
+                ObjectContent::Mesh { points, triangles } => {
                     let label = labels.of(&named, (&path, placed.object), target);
                     add(points, triangles, &placed, label, target)?;
                 }
-                Content::Parts(parts) => {
+                ObjectContent::Parts(parts) => {
                     for part in parts.iter().rev() {
                         let transform = part.transform.then(&placed.transform);
                         stack.push((
@@ -168,7 +168,7 @@ impl Package {
                         ));
                     }
                 }
-                Content::Other(what) => {
+                ObjectContent::Other(what) => {
                     let what = format!("an object of the kind `{what}`");
                     return Err(object.place.refuse(ReadFault::Unsupported(what)));
                 }
@@ -191,7 +191,7 @@ impl Package {
                 .flat_map(|(path, model)| model.objects.iter().map(move |(id, o)| (path, id, o)))
         };
         let unused = all().filter(|&(path, &id, o)| {
-            matches!(o.content, Content::Mesh { .. }) && !used.contains(&(path.clone(), id))
+            matches!(o.content, ObjectContent::Mesh { .. }) && !used.contains(&(path.clone(), id))
         });
         for (n, what) in [
             (unused.count(), "object|that no build places|was|were"),

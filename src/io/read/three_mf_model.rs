@@ -49,7 +49,7 @@ pub(super) struct Placed {
 }
 
 #[derive(Debug)]
-pub(super) enum Content {
+pub(super) enum ObjectContent {
     Mesh {
         points: Vec<[f64; 3]>,
         triangles: Vec<[u32; 3]>,
@@ -63,7 +63,7 @@ pub(super) enum Content {
 pub(super) struct Object {
     pub name: String,
     pub is_support: bool,
-    pub content: Content,
+    pub content: ObjectContent,
     pub place: FilePlace,
 }
 
@@ -73,7 +73,7 @@ pub(super) struct Model {
     pub objects: BTreeMap<u32, Object>,
     /// What the build places.
     pub items: Vec<Placed>,
-    /// Content that is not read, in words.
+    /// ObjectContent that is not read, in words.
     pub left_out: BTreeSet<String>,
 }
 
@@ -99,21 +99,21 @@ impl Model {
     /// Paths of other models that this one needs.
     pub fn paths(&self) -> Vec<String> {
         let parts = self.objects.values().flat_map(|object| match &object.content {
-            Content::Parts(parts) => &parts[..],
+            ObjectContent::Parts(parts) => &parts[..],
             _ => &[],
         });
         parts.chain(&self.items).filter_map(|placed| placed.path.clone()).collect()
     }
 
     pub fn n_meshes(&self) -> usize {
-        self.objects.values().filter(|o| matches!(o.content, Content::Mesh { .. })).count()
+        self.objects.values().filter(|o| matches!(o.content, ObjectContent::Mesh { .. })).count()
     }
 
     /// All objects that are no part of others, where they are.
     pub fn unplaced(&self) -> Vec<Placed> {
         let mut inner = BTreeSet::new();
         for object in self.objects.values() {
-            if let Content::Parts(parts) = &object.content {
+            if let ObjectContent::Parts(parts) = &object.content {
                 inner.extend(parts.iter().filter(|p| p.path.is_none()).map(|p| p.object));
             }
         }
@@ -129,7 +129,7 @@ impl Model {
 
     /// Reads a model. `file` names it in errors.
     pub fn parse(text: &[u8], path: &str, file: &str) -> Result<Self> {
-        let mut parser = Parser {
+        let mut parser = ModelParser {
             file,
             lines: Lines::default(),
             object: None,
@@ -165,7 +165,7 @@ impl Model {
     }
 }
 
-struct Parser<'t> {
+struct ModelParser<'t> {
     file: &'t str,
     lines: Lines,
     object: Option<(u32, Object)>,
@@ -173,7 +173,7 @@ struct Parser<'t> {
     is_whole: bool,
 }
 
-impl Parser<'_> {
+impl ModelParser<'_> {
     fn place(&self) -> FilePlace {
         FilePlace { file: self.file.to_owned(), spot: Spot::Line(self.lines.line()) }
     }
@@ -210,7 +210,8 @@ impl Parser<'_> {
                 false,
             ) => {
                 if let (Some((_, object)), "mesh") = (&mut self.object, tag.name) {
-                    object.content = Content::Mesh { points: Vec::new(), triangles: Vec::new() };
+                    object.content =
+                        ObjectContent::Mesh { points: Vec::new(), triangles: Vec::new() };
                 }
             }
             ("model", true) => self.is_whole = true,
@@ -218,7 +219,7 @@ impl Parser<'_> {
             ("object", true) => self.end(model)?,
             ("vertex", false) => {
                 let p = [self.number(tag, "x")?, self.number(tag, "y")?, self.number(tag, "z")?];
-                if let Some((_, Object { content: Content::Mesh { points, .. }, .. })) =
+                if let Some((_, Object { content: ObjectContent::Mesh { points, .. }, .. })) =
                     &mut self.object
                 {
                     points.push(p);
@@ -235,8 +236,10 @@ impl Parser<'_> {
                 let placed = self.placed(tag)?;
                 match &mut self.object {
                     None => model.items.push(placed),
-                    Some((_, Object { content: Content::Parts(parts), .. })) => parts.push(placed),
-                    Some((_, object)) => object.content = Content::Parts(vec![placed]),
+                    Some((_, Object { content: ObjectContent::Parts(parts), .. })) => {
+                        parts.push(placed)
+                    }
+                    Some((_, object)) => object.content = ObjectContent::Parts(vec![placed]),
                 }
             }
             (_, true) => {}
@@ -250,8 +253,8 @@ impl Parser<'_> {
                     other => format!("`{other}`"),
                 };
                 match &mut self.object {
-                    Some((_, object)) if matches!(object.content, Content::Other(_)) => {
-                        object.content = Content::Other(other.to_owned());
+                    Some((_, object)) if matches!(object.content, ObjectContent::Other(_)) => {
+                        object.content = ObjectContent::Other(other.to_owned());
                     }
                     _ => drop(model.left_out.insert(what)),
                 }
@@ -265,7 +268,7 @@ impl Parser<'_> {
         let id = self.id(tag, "id")?;
         let is_support = tag.get("type").is_some_and(|kind| kind.ends_with("support"));
         let name = unescaped(tag.get("name").unwrap_or_default());
-        let content = Content::Other("object without triangles".to_owned());
+        let content = ObjectContent::Other("object without triangles".to_owned());
         self.object = Some((id, Object { name, is_support, content, place: self.place() }));
         if tag.is_empty {
             return Err(self.expected("an object with content", "an empty one"));
@@ -277,7 +280,7 @@ impl Parser<'_> {
         let Some((id, object)) = self.object.take() else {
             return Err(self.expected("an object before its end", "none"));
         };
-        if let Content::Mesh { points, triangles } = &object.content {
+        if let ObjectContent::Mesh { points, triangles } = &object.content {
             let n = points.len();
             if let Some(&v) = triangles.iter().flatten().find(|&&v| v as usize >= n) {
                 let (index, high) = (i64::from(v), n as i64 - 1);
@@ -292,7 +295,8 @@ impl Parser<'_> {
     }
 
     fn add_triangle(&mut self, corners: [u32; 3]) -> Result<()> {
-        if let Some((_, Object { content: Content::Mesh { triangles, .. }, .. })) = &mut self.object
+        if let Some((_, Object { content: ObjectContent::Mesh { triangles, .. }, .. })) =
+            &mut self.object
         {
             triangles.push(corners);
         }
