@@ -5,7 +5,6 @@ use std::fmt;
 use super::SizingError;
 use super::constraint::SizeConstraint;
 use super::length::Length;
-use super::options::SizeOptions;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{Seeker, Surface};
@@ -86,13 +85,14 @@ pub struct NearLabel<'a> {
 }
 
 impl<'a> NearLabel<'a> {
-    /// The sizes that `options` have for labels of a surface. A scratch file that fails unwinds.
+    /// The sizes for labels of a surface, in a field of slope `beta`. A scratch file that fails unwinds.
     ///
     /// # Errors
     /// A label that no triangle has.
     pub fn all(
         surface: &'a Surface,
-        options: &SizeOptions,
+        sizes: &[LabelSize],
+        beta: f64,
         scratch: &ScratchSpace,
     ) -> Result<Vec<Self>, SizingError> {
         let diagonal = surface.bounds().diagonal();
@@ -111,10 +111,10 @@ impl<'a> NearLabel<'a> {
                 triangles: Seeker::with_filter(surface, scratch, |t| t < n && is_here(t)),
                 h: size.h.resolve(diagonal),
                 distance: size.distance.map_or(0.0, |distance| distance.resolve(diagonal)),
-                beta: options.beta(),
+                beta,
             })
         };
-        options.labels.iter().map(one).collect()
+        sizes.iter().map(one).collect()
     }
 }
 
@@ -152,7 +152,7 @@ impl SizeConstraint for NearLabel<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ExtraSizes, SizeField};
+    use super::super::{ExtraSizes, SizeField, SizeOptions};
     use super::*;
 
     #[test]
@@ -200,7 +200,8 @@ mod tests {
             let size = LabelSize::parse(text).expect("a size");
             let h = size.h.resolve(1.0);
             let options = SizeOptions { labels: vec![size], ..SizeOptions::default() };
-            let near = NearLabel::all(&surface, &options, &scratch).expect("a known label");
+            let near = NearLabel::all(&surface, &options.labels, options.beta(), &scratch)
+                .expect("a known label");
             let list: Vec<&dyn SizeConstraint> =
                 near.iter().map(|near| near as &dyn SizeConstraint).collect();
             let extra = ExtraSizes { constraints: &list, ..ExtraSizes::default() };
@@ -221,9 +222,8 @@ mod tests {
     #[test]
     fn an_unknown_label_is_refused_with_those_there_are() {
         let labels = vec![LabelSize::parse("flor,1").expect("a size")];
-        let options = SizeOptions { labels, ..SizeOptions::default() };
         let surface = cube();
-        let near = NearLabel::all(&surface, &options, &ScratchSpace::boundless());
+        let near = NearLabel::all(&surface, &labels, 0.3, &ScratchSpace::boundless());
         let error = near.err().map(|e| e.to_string()).unwrap_or_default();
         assert!(error.contains("flor") && error.contains("floor, rest"), "{error}");
     }

@@ -153,7 +153,7 @@ fn prepare_in(
     }
     let requested = &options.mesh.sizes;
     let isolated_points = surface.isolated_points();
-    let labels = NearLabel::all(surface, requested, scratch)?;
+    let labels = NearLabel::all(surface, &requested.labels, requested.beta(), scratch)?;
     let built = |regions: &[Region]| {
         let mut constraints: Vec<&dyn SizeConstraint> =
             regions.iter().map(|r| r as &dyn SizeConstraint).collect();
