@@ -1,6 +1,6 @@
 //! Builds a surface while files are read: welding, labels, fans.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::label_sets::{JOIN_BYTES, LabelNumbers, drop_unused_labels};
 use super::polygon::{cut_facet, cut_polygon};
@@ -39,6 +39,9 @@ pub struct SurfaceBuilder {
     uncut: Vec<[u32; 2]>,
     /// Triangles of this file are given by position, not by the file's vertex numbers.
     by_position: bool,
+    /// Ends of edges of this file that are embedded later, by the file's numbers, and those of all files before.
+    edge_ends: Vec<u32>,
+    embedded: HashSet<u32>,
     /// Bytes it may hold; `None` for as many as there are.
     bytes_max: Option<u64>,
 }
@@ -176,6 +179,11 @@ impl SurfaceBuilder {
         push(&mut self.surface.triangles, corners);
         push(&mut self.surface.labels, label);
         Ok(())
+    }
+
+    /// Counts the ends of an edge, which is embedded later, as used.
+    pub fn edge(&mut self, ends: [u32; 2]) {
+        self.edge_ends.extend(ends);
     }
 
     /// Adds a polygon of at least three vertices of the file: a fan from its first one where that is right, else other triangles of its
@@ -394,6 +402,8 @@ impl SurfaceBuilder {
                 }
             }
         }
+        let ends = self.edge_ends.drain(..).filter_map(|v| self.file2vert.get(v as usize));
+        self.embedded.extend(ends);
         if self.n_welded > 0 {
             self.note(NoteKind::WeldedVertices { n: self.n_welded });
         }
@@ -414,7 +424,11 @@ impl SurfaceBuilder {
     pub fn finish(self) -> Surface {
         let mut surface = self.surface;
         drop(self.table);
-        let n_unused = drop_unused_points(&mut surface);
+        let mut own_ends = self.embedded;
+        if !own_ends.is_empty() {
+            surface.triangles.iter().flatten().for_each(|v| _ = own_ends.remove(v));
+        }
+        let n_unused = drop_unused_points(&mut surface) - own_ends.len() as u64;
         if n_unused > 0 {
             let file = surface.files.first().map_or(String::new(), |f| f.name.clone());
             surface.notes.push(Note { file, kind: NoteKind::UnusedVertices { n: n_unused } });

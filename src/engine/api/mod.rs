@@ -110,7 +110,7 @@ pub use surface_report::SurfaceReport;
 pub use targets::{check_target, inputs_of};
 pub use tasks::Tasks;
 pub use tasks_status::{GatherReport, TaskReport, TaskStage, TaskStatus, task_ranges};
-pub use tetdb_base::geom::short;
+pub use tetdb_base::geom::{count, short};
 pub use tetdb_base::storage::CancelToken;
 pub use tetdb_base::surface::show as show_point;
 pub use tetdb_base::surface::{Defect, SplitReport};

@@ -9,7 +9,7 @@ use std::io::BufRead;
 use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::feed::{Feed, not_a_number, parse, quote};
 use super::{FilePlace, ReadError, ReadFault, Result, Spot, SurfaceSink};
-use tetdb_base::geom::Point;
+use tetdb_base::geom::{Point, counted};
 use tetdb_base::surface::NoteKind;
 
 /// Names in force; the first of group, object and material that is not empty is the label of a face.
@@ -170,8 +170,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         target.builder.note(NoteKind::Said(what));
     }
     if let Some((word, Spot::Line(line))) = unknown {
-        let left_out = "lines of no known kind were left out, the first one";
-        let what = format!("{n_unknown} {left_out} {word} in line {line}");
+        let left_out = "[line|lines] of no known kind [was|were] left out, the first one";
+        let what = format!("{} {word} in line {line}", counted(n_unknown, left_out));
         target.builder.note(NoteKind::Said(what));
     }
     let known = target.builder.n_file_vertices() as u32;

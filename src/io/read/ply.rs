@@ -4,7 +4,7 @@ use std::io::BufRead;
 
 use super::feed::{Feed, parse, quote};
 use super::{Result, Spot, SurfaceSink};
-use tetdb_base::geom::Point;
+use tetdb_base::geom::{Point, counted};
 use tetdb_base::surface::NoteKind;
 
 /// Whole numbers of faces that name no region.
@@ -115,7 +115,9 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
 
 /// Notes elements that are neither vertices nor faces.
 fn note_skipped(element: &str, n: u64, target: &mut SurfaceSink) {
-    let what = format!("{n} records of the element {} were left out", quote(element.as_bytes()));
+    let name = quote(element.as_bytes());
+    let records = counted(n, "[record|records] of the element");
+    let what = format!("{records} {name} {} left out", if n == 1 { "was" } else { "were" });
     match (n, element) {
         (0, _) => {}
         (_, "edge") => target.builder.note(NoteKind::SkippedElements { what: "edges", n }),

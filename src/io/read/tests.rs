@@ -6,6 +6,7 @@ mod groups;
 mod indexed;
 mod losses;
 mod medit;
+mod packed_xml;
 mod ply;
 mod stl;
 mod tetgen;

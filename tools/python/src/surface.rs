@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use serde_json::json;
 use tetdb::{CancelToken, CellArrays, DefectPlace, Seed, SeedKind};
 
-use crate::sizes::length;
+use crate::sizes::{LengthWords, length};
 use crate::watched::watched;
 
 /// A surface; several may share its memory, and nobody changes it.
@@ -186,13 +186,15 @@ impl Surface {
         })
     }
 
-    /// Edges of a file, or, with `points`, of arrays; if it `divides`, triangles are divided where ends lie on them.
+    /// Edges of a file, or, with `points`, of arrays; if it `divides`, triangles are divided where ends lie on them, and ends nearer than
+    /// `snap` are moved there.
     fn embedded_edges(
         &self,
         py: Python<'_>,
         edges: EdgesGiven<'_>,
         name: String,
         divides: bool,
+        snap: Option<LengthWords>,
     ) -> PyResult<Self> {
         let given = match edges {
             EdgesGiven::File(file) => Err(file),
@@ -203,7 +205,7 @@ impl Surface {
             )),
         };
         made(py, || {
-            let surface = self.to_embed_in(divides);
+            let surface = self.to_embed_in(divides, snap);
             match given {
                 Err(file) => surface.embedded_edges(file, Some(&name)),
                 Ok((points, edges, labels)) => {
@@ -221,6 +223,7 @@ impl Surface {
         points: PointsGiven<'_>,
         name: String,
         divides: bool,
+        snap: Option<LengthWords>,
     ) -> PyResult<Self> {
         let given = match points {
             PointsGiven::File(file) => Err(file),
@@ -229,7 +232,7 @@ impl Surface {
             }
         };
         made(py, || {
-            let surface = self.to_embed_in(divides);
+            let surface = self.to_embed_in(divides, snap);
             match given {
                 Err(file) => surface.embedded_points(file, Some(&name)),
                 Ok((points, labels)) => {
@@ -250,11 +253,14 @@ impl Surface {
 }
 
 impl Surface {
-    fn to_embed_in(&self, divides: bool) -> tetdb::Surface {
-        let surface = tetdb::Surface::clone(&self.inner);
-        match divides {
-            true => surface.dividing(),
-            false => surface,
+    fn to_embed_in(&self, divides: bool, snap: Option<LengthWords>) -> tetdb::Surface {
+        let mut surface = tetdb::Surface::clone(&self.inner);
+        if divides {
+            surface = surface.dividing();
+        }
+        match snap {
+            Some(within) => surface.snapping(length(within)),
+            None => surface,
         }
     }
 }

@@ -55,9 +55,14 @@ class Surface:
         edges: str | tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32], list[str] | None],
         name: str,
         divides: bool,
+        snap: tuple[float, bool] | None,
     ) -> Surface: ...
     def embedded_points(
-        self, points: str | tuple[npt.NDArray[np.float64], list[str] | None], name: str, divides: bool
+        self,
+        points: str | tuple[npt.NDArray[np.float64], list[str] | None],
+        name: str,
+        divides: bool,
+        snap: tuple[float, bool] | None,
     ) -> Surface: ...
     def write(self, out: str) -> tuple[bool, int, int]: ...
 

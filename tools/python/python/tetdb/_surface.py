@@ -145,7 +145,7 @@ class Surface:
 
     @classmethod
     def read(cls, *files: str | os.PathLike[str]) -> Surface:
-        """Reads files as one surface: STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen; each a label unless it has its own."""
+        """Reads files as one surface: STL, PLY, OBJ, OFF, 3MF, GIFTI, MEDIT, Gmsh, TetGen and others; each a label unless it has its own."""
         return cls._of(_native.Surface.read([os.fspath(f) for f in files]))
 
     @classmethod
@@ -261,7 +261,7 @@ class Surface:
         both._parts = Surface.embedded, (self, inside, name)
         return both
 
-    def embedded_edges(self, edges: Any, name: str, divide: bool = False) -> Surface:
+    def embedded_edges(self, edges: Any, name: str, divide: bool = False, snap: Length | None = None) -> Surface:
         """The same with edges inside: each is an edge of the mesh, whole and in its place. To be called after :meth:`embedded`.
 
         Parameters
@@ -273,6 +273,8 @@ class Surface:
         divide : bool
             Whether triangles are divided where ends of edges lie exactly on them. Edges otherwise meet them, and each other, in common
             vertices alone.
+        snap : float or str, optional
+            Ends nearer than this to a triangle are moved onto it, and divide it there: a length, or ``"1%"`` of the diagonal.
         """
         _check_name(name)
         if _is_path(edges):
@@ -287,18 +289,18 @@ class Surface:
             given = points, np.ascontiguousarray(pairs, dtype=np.uint32), _words(edges[2:], len(pairs))
         else:
             raise SurfaceError("unsupported-content", f"{type(edges).__name__} is no edges", "edges", "give a path, or points and pairs of them")
-        both = self._of(self._inner.embedded_edges(given, name, bool(divide)))
-        both._parts = Surface.embedded_edges, (self, edges, name, divide)
+        both = self._of(self._inner.embedded_edges(given, name, bool(divide), _within(snap)))
+        both._parts = Surface.embedded_edges, (self, edges, name, divide, snap)
         return both
 
-    def embedded_points(self, points: Any, name: str, divide: bool = False) -> Surface:
+    def embedded_points(self, points: Any, name: str, divide: bool = False, snap: Length | None = None) -> Surface:
         """The same with points inside: each is a vertex of the mesh that is not moved.
 
         Parameters
         ----------
         points : path, array or tuple
             A ``.csv``, ``.node``, ``.obj`` or legacy ``.vtk`` file; or (n, 3); or both of this and n labels.
-        name, divide
+        name, divide, snap
             As of :meth:`embedded_edges`.
         """
         _check_name(name)
@@ -308,8 +310,8 @@ class Surface:
             xyz, *labels = points if isinstance(points, tuple) and len(points) == 2 else (points,)
             xyz = _points_of(xyz)
             given = xyz, _words(labels, len(xyz))
-        both = self._of(self._inner.embedded_points(given, name, bool(divide)))
-        both._parts = Surface.embedded_points, (self, points, name, divide)
+        both = self._of(self._inner.embedded_points(given, name, bool(divide), _within(snap)))
+        both._parts = Surface.embedded_points, (self, points, name, divide, snap)
         return both
 
     def write(self, path: str | os.PathLike[str]) -> None:
@@ -368,6 +370,10 @@ def sample(spec: str) -> Surface:
     if not isinstance(spec, str):
         raise SurfaceError("bad-sample", f"{spec!r} is no text", "spec")
     return Surface._of(_native.Surface.sample(spec))
+
+
+def _within(snap: Length | None) -> tuple[float, bool] | None:
+    return None if snap is None else length(snap, "snap")
 
 
 def _check_name(name: object) -> None:
