@@ -9,6 +9,7 @@ pub mod chunk;
 pub mod code;
 pub mod digest;
 pub mod ids;
+pub mod labels;
 pub mod page;
 pub mod record;
 pub mod row;

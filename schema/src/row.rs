@@ -50,11 +50,13 @@ pub enum RowKind {
     RegionNames = 78,
     /// [`WiresRow`](crate::catalog::WiresRow).
     Embedded = 79,
+    /// Vector of [`LabelSet`](crate::labels::LabelSet), ascending by label.
+    LabelSets = 80,
 }
 
 impl RowKind {
     /// All kinds, by number.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Format,
         Self::State,
         Self::Job,
@@ -71,6 +73,7 @@ impl RowKind {
         Self::Stage,
         Self::RegionNames,
         Self::Embedded,
+        Self::LabelSets,
     ];
 
     /// The kind of a key; `None` for a key of no row.

@@ -6,15 +6,14 @@ use serde_json::json;
 
 use super::args::CheckArgs;
 use super::check_report::Printed;
+use super::config;
 use super::console::Console;
 use super::failure::Failure;
 use super::input;
 use super::memory;
 use super::words;
 use tetdb_engine::api::targets::check_target;
-use tetdb_engine::api::{
-    Code, MeshOptions, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short,
-};
+use tetdb_engine::api::{Code, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short, typed};
 
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are validated before anything is read.
@@ -30,8 +29,11 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     }
     // A check writes no temporary files next to its input.
     let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
-    let options = MeshOptions::default();
+    let options = typed(config::inside_of(&args.inside))?;
     let mut surface = input::load_with(&args.surfaces, &args.sheets, &options, &settings, console)?;
+    if !args.repair {
+        surface = surface.inside_settled(options.embed_outside, &settings)?;
+    }
     let mut repair = None;
     if args.repair {
         let done;

@@ -4,7 +4,7 @@ use std::path::Path;
 use tetdb_engine::api::error::Error;
 use tetdb_engine::api::{Code, MeshOptions, OptionsText, Seed, SeedKind, Word, read_seeds, typed};
 
-use super::args::{ShapeArgs, SizeArgs};
+use super::args::{InsideArgs, ShapeArgs, SizeArgs};
 use super::failure::Failure;
 
 /// Keys of a recorded job that no file of options has.
@@ -48,6 +48,7 @@ pub fn sizes_of(args: &SizeArgs) -> OptionsText {
         size_sphere,
         size_cylinder,
         size_region,
+        size_label,
         size_field,
         size_expr,
     } = args.clone();
@@ -60,8 +61,19 @@ pub fn sizes_of(args: &SizeArgs) -> OptionsText {
         size_sphere,
         size_cylinder,
         size_region,
+        size_label,
         size_expr,
         size_field,
+        ..OptionsText::default()
+    }
+}
+
+/// The treatment of what is inside, given on the command line.
+pub fn inside_of(args: &InsideArgs) -> OptionsText {
+    let InsideArgs { snap_embedded, embed_outside } = args;
+    OptionsText {
+        snap_embedded: snap_embedded.clone(),
+        embed_outside: embed_outside.map(|outside| outside.word().to_owned()),
         ..OptionsText::default()
     }
 }
@@ -73,8 +85,7 @@ fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
         sizes,
         config: _,
         refine_surface,
-        snap_embedded,
-        embed_outside,
+        inside,
         regions,
         region_seed,
         hole,
@@ -95,9 +106,7 @@ fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
         seal: seal.map(|seal| seal.word().to_owned()),
         keep_stages: *keep_stages,
         refine_surface: *refine_surface,
-        snap_embedded: snap_embedded.clone(),
-        embed_outside: embed_outside.map(|outside| outside.word().to_owned()),
-        ..sizes_of(sizes)
+        ..inside_of(inside).overridden_by(sizes_of(sizes))
     };
     if let Some(path) = file_of_seeds {
         for seed in seeds(path)? {

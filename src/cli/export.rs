@@ -213,7 +213,16 @@ pub fn write(
 
 /// Says that a format has numbers only where the store has names.
 fn note_numbers(format: MeshFormat, store: &Store, console: &Console) {
-    use MeshFormat::{Medit, MeditBinary, Numpy, TetGen};
+    use MeshFormat::{Gmsh22, Medit, MeditBinary, Numpy, TetGen};
+    let summary = store.summary();
+    if let Some(set) = summary.label_sets.first()
+        && matches!(format, Gmsh22 | Medit | MeditBinary | Numpy | TetGen)
+    {
+        let name = &summary.labels[set.label as usize];
+        console.note(&format!(
+            "note: this format has one label for a triangle; those of several groups have one of their own, such as {name}"
+        ));
+    }
     let is_name = |name: &String| name.parse::<u64>().is_err();
     if matches!(format, Medit | MeditBinary | Numpy | TetGen)
         && store.summary().labels.iter().any(is_name)

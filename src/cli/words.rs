@@ -10,14 +10,7 @@ const LISTED: usize = 12;
 
 /// A count with its noun: `1 label`, `2 labels`.
 pub fn count(n: impl Into<u64>, what: &str) -> String {
-    match n.into() {
-        1 => format!("1 {what}"),
-        n => match what {
-            "tetrahedron" => format!("{n} tetrahedra"),
-            "vertex" => format!("{n} vertices"),
-            _ => format!("{n} {what}s"),
-        },
-    }
+    tetdb_engine::api::count(n.into(), what)
 }
 
 /// The range of qualities of a row of a table: `1 to 2`, of the last one `10 and more`.

@@ -216,6 +216,7 @@ fn the_answer_has_its_fields() {
             "defects",
             "edges",
             "fitness",
+            "label_sets",
             "labels",
             "n_defects",
             "nonmanifold_edges",

@@ -22,6 +22,7 @@ const RUNS: [(&str, &[&str]); 16] = [
             "check sphere.stl",
             "check holes.off --write-bad bad.vtu",
             "check crossing.off",
+            "check groups.msh",
             "check needles.off",
             "check holes.off --repair --weld 1e-3 --write fixed.off",
         ],
@@ -33,6 +34,7 @@ const RUNS: [(&str, &[&str]); 16] = [
             "mesh box.stl -o a.tetdb --subdomains 2 --keep-stages --memory 256MiB",
             "resume a.tetdb",
             "mesh sample:wells,count=1,points=1 -o wells.tetdb",
+            "mesh groups.msh -o groups.tetdb",
             "mesh box.stl -o t.tetdb --subdomains 2 --coarse-only --memory 256MiB",
         ],
     ),
@@ -139,6 +141,7 @@ fn every_key_is_documented_and_no_other() {
     place.write("holes.off", HOLES);
     place.write("crossing.off", CROSSING);
     place.write("needles.off", NEEDLES);
+    place.write("groups.msh", super::groups::msh22());
     let talk = documented("stderr");
     let (mut said, mut of_info) = (BTreeSet::new(), BTreeSet::new());
     for (section, lines) in RUNS {

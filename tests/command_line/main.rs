@@ -7,6 +7,7 @@ mod damage;
 mod errors;
 mod exports;
 mod forms;
+mod groups;
 mod guide;
 mod json;
 mod limits;

@@ -201,7 +201,7 @@ fn odd_files_are_meshed() {
         good("negative.obj", obj_negative()),
         noted("polygons.off", off_polygons(), "6 polygons were cut"),
         good("big.ply", ply_big_endian()),
-        noted("inverted.off", off(&inverted), "1 triangles were turned"),
+        noted("inverted.off", off(&inverted), "1 triangle was turned"),
         noted("welded.off", off(&shell), "28 vertices repeat"),
     ] {
         meshed(&case);

@@ -46,6 +46,8 @@ fn estimates_come_true() {
         "sample:box,h=0.2 --size-sphere 0.5,0.5,0.5,0.2,0.02",
         "sample:box,h=0.2 --size-expr 0.03+0.3*abs(x-0.5)",
         "sample:shells,count=2,h=0.2 --regions all --size-region 2,0.06",
+        "sample:shells,count=2,h=0.2 --regions all --size-label shell-2,0.05",
+        "sample:shells,count=2,h=0.2 --size-label shell-2,0.06,10%",
     ]
     .into_iter()
     .enumerate()
@@ -135,6 +137,56 @@ fn regions_have_sizes_of_their_own() {
 }
 
 #[test]
+fn lengths_near_a_label_follow_it() {
+    let place = Place::new();
+    place.run_line("sample faults,cells=8 -o rock.obj").succeeds();
+    let inside = "--embed rock_sheets.obj --name rock_sheets.obj=f";
+    for (k, (surface, label, options)) in [
+        ("sample:shells,count=2,h=0.3", "shell-2", "--size-label shell-2,0.08"),
+        ("sample:shells,count=2,h=0.3,kind=boxes", "shell-1", "--size-label shell-1,2%,3%"),
+        (&format!("rock.obj {inside}"), "f:fault-1", "--size-label f:fault-1,0.03 --threads 1"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let tets = |store: &str, label: &str| {
+            let line = format!("query {store} --label {label} --json");
+            let text = place.run_line(&line).succeeds().stdout();
+            text.lines().filter(|line| line.contains("\"id\"")).count()
+        };
+        let mut found = Vec::new();
+        for (name, options) in [("plain", ""), ("near", options)] {
+            let store = format!("{k}{name}.tetdb");
+            let line = format!("mesh {surface} {options} --refine-surface -o {store}");
+            place.run_line(&line).succeeds();
+            found.push(tets(&store, label));
+        }
+        assert!(found[1] >= 4 * found[0], "{surface}: {found:?}");
+    }
+    let (store, info) = ("1near.tetdb", "info 1near.tetdb --json");
+    let recorded = place.run_line(info).succeeds().stdout();
+    assert!(recorded.contains("shell-1,2%,3%"), "{store}: {recorded}");
+    place
+        .write("job.toml", "size_label = [[\"shell-1\", \"2%\", \"3%\"]]\nrefine_surface = true\n");
+    let line =
+        "mesh sample:shells,count=2,h=0.3,kind=boxes --config job.toml --memory 64MiB -o c.tetdb";
+    place.run_line(line).succeeds();
+    assert_eq!(place.digest("c.tetdb"), place.digest(store));
+    for (asked, named) in [
+        ("--size-label=shell,0.1", "shell-1, shell-2"),
+        ("--size-label=shell-1", "LABEL,H,DISTANCE"),
+        ("--size-label=shell-1,-0.1", "-0.1"),
+    ] {
+        let line = format!("mesh sample:shells,count=2,h=0.3 -o bad.tetdb --json {asked}");
+        let done = place.run_line(&line);
+        let error = done.error();
+        assert_eq!((error["code"].as_str(), done.exit()), (Some("bad-size"), Some(2)), "{asked}");
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.contains(named), "{asked}: {message}");
+    }
+}
+
+#[test]
 fn sizes_by_position_give_one_mesh() {
     let place = Place::new();
     let expression = "0.06+0.3*abs(x-0.5)";
@@ -190,10 +242,10 @@ fn expressions_that_are_no_sizes_are_named() {
 fn a_shape_names_its_bad_number_and_help_fits_the_fault() {
     let place = Place::new();
     for (asked, parts) in [
-        ("--size-sphere 1.5,0,0,5%,2%", ["in it 5%", "coordinates and radii"]),
-        ("--size-box 0,0,0,1,1,x,0.1", ["in it x", "coordinates and radii"]),
+        ("--size-sphere 1.5,0,5%,1,2%", ["in it 5%", "coordinates are numbers"]),
+        ("--size-box 0,0,0,1,1,x,0.1", ["in it x", "coordinates are numbers"]),
         ("--size-cylinder 0,0,0,1,1,1,1,-2", ["in it -2", "lengths above zero"]),
-        ("--size-sphere 1,2,3", ["X,Y,Z,R,H", "coordinates and radii"]),
+        ("--size-sphere 1,2,3", ["X,Y,Z,R,H", "coordinates are numbers"]),
         ("--size-region 5,0.1", ["5", "name a region"]),
         ("--size-expr x", ["size-expr x is", "everywhere in the surface's box"]),
         ("--hsiz 5mm", ["5mm", "share of its box diagonal"]),

@@ -337,15 +337,17 @@ fn what_is_embedded_outside_is_left_out_where_that_is_asked_for() {
     let error = place.run_line("mesh box.obj --embed-points some.csv --json").error();
     assert_eq!(error["code"], "wire-outside");
     let message = error["message"].as_str().unwrap_or_default();
-    for words in ["2 of the embedded points", "point 0 of \"some:out\"", "1.7e0 from"] {
+    for words in
+        ["2 of the embedded points", "the point \"some:out\" in line 2 of its file", "1.7e0 from"]
+    {
         assert!(message.contains(words), "{message}");
     }
     for (embedded, left_out, edges, points) in [
         ("--embed-points some.csv", "0 edges and 2 points outside", 0, 2),
-        ("--embed-points all.csv", "0 edges and 1 points outside", 0, 0),
+        ("--embed-points all.csv", "0 edges and 1 point outside", 0, 0),
         ("--embed-points inner.csv", "", 0, 2),
-        ("--embed-edges rods.obj --embed-points rods.obj", "1 edges and 1 points outside", 1, 1),
-        ("--embed-edges rods.obj --refine-surface --hsiz 0.5", "1 edges and 0 points", 1, 0),
+        ("--embed-edges rods.obj --embed-points rods.obj", "1 edge and 1 point outside", 1, 1),
+        ("--embed-edges rods.obj --refine-surface --hsiz 0.5", "1 edge and 0 points", 1, 0),
     ] {
         let line = format!("mesh box.obj {embedded} --embed-outside skip -o s.tetdb --force");
         let notes = place.run_line(&line).succeeds().stderr();
@@ -358,7 +360,45 @@ fn what_is_embedded_outside_is_left_out_where_that_is_asked_for() {
         let again = place.run_line(&line).succeeds().stderr();
         assert!(again.contains("already holds"), "{again}");
     }
-    place.run_line("estimate box.obj --embed-points some.csv --embed-outside skip").succeeds();
+    for command in ["estimate", "check"] {
+        let line = format!("{command} box.obj --embed-points some.csv");
+        assert_eq!(place.run_line(&format!("{line} --json")).error()["code"], "wire-outside");
+        let skips = place.run_line(&format!("{line} --embed-outside skip")).succeeds();
+        assert!(skips.stderr().contains("0 edges and 2 points outside"), "{}", skips.stderr());
+    }
     let words = "mesh box.obj --embed-points some.csv --embed-outside drop --json";
     assert_eq!(place.run_line(words).error()["code"], "usage");
+}
+
+#[test]
+fn a_check_finds_what_a_run_would_refuse_and_names_lines() {
+    let place = Place::new();
+    place.write("box.obj", BOX);
+    // Comments and a line of names count as lines.
+    place.write("near.csv", "# gauges\nx,y,z,name\n0.5,0.5,0.5,mid\n\n0.2,0.3,1.001,top\n");
+    place.write("close.csv", "0.5 0.5 0.5\n0.2 0.3 0.99999999999999\n0.4 0.3 0.99999999999999\n");
+    place.write("wall.obj", "v 0.5 2 0\nv 0.5 3 0\nv 0.5 2 1\nf 1 2 3\n");
+    for (inside, code, message) in [
+        ("--embed-points near.csv", "wire-outside", "\"near:top\" in line 5 of its file"),
+        ("--embed-points close.csv", "wire-too-near", "\"close\" in line 2 of its file, the point"),
+        ("--embed wall.obj", "sheet-outside", "wall"),
+    ] {
+        for command in ["check box.obj", "mesh box.obj -o a.tetdb"] {
+            let error = place.run_line(&format!("{command} {inside} --json")).error();
+            assert_eq!(error["code"], code, "{command} {inside}: {error}");
+            let found = error["message"].as_str().unwrap_or_default();
+            assert!(found.contains(message), "{command} {inside}: {found}");
+        }
+    }
+    let line = "check box.obj --embed-points near.csv --snap-embedded 1% --json";
+    let report = place.run_line(line).succeeds();
+    assert_eq!(report.json()["triangles"], 14, "the snapped point divides a triangle");
+    assert_eq!(
+        place.run_line("check box.obj --snap-embedded x --json").error()["code"],
+        "bad-size"
+    );
+    // A hole where the surface is open is reported as before.
+    place.write("open.obj", BOX.replace("f 2 8 6\n", ""));
+    let line = "check open.obj --embed-points near.csv --snap-embedded 1%";
+    assert_eq!(place.run_line(line).exit(), Some(3));
 }

@@ -23,6 +23,7 @@ use tetdb_schema::chunk::{
     ChunkAddress, ChunkRecord, Decoder, RangeSummary, TetSummary, VertexSummary,
 };
 use tetdb_schema::digest::{Digest, vertex_mix};
+use tetdb_schema::labels::LabelSet;
 use tetdb_schema::page::{PageAddress, SLOTS, open_page, page_key, u32_le};
 use tetdb_schema::record::{
     CoarseFace, CoarseTet, CoarseVertex, InterfaceFace, SealedFacet, SealedTet, SealedVertex,
@@ -154,6 +155,7 @@ fn row_text(kind: RowKind, key: u64, value: &[u8]) -> Result<String, String> {
         RowKind::Coarse => text::<CoarseRow>(key, value),
         RowKind::Stage => text::<StageRow>(key, value),
         RowKind::Embedded => text::<WiresRow>(key, value),
+        RowKind::LabelSets => text::<Vec<LabelSet>>(key, value),
         _ => Err(format!("a row of kind {kind:?}")),
     }
 }

@@ -29,7 +29,7 @@ import tempfile
 
 import numpy as np
 
-THIN, SOLID, CURVED = r"(lines|edges|beams|points)\b.* left out", r"(solid elements|tetrahedra|hexahedra).* left out", r"curved faces"
+THIN, SOLID, CURVED = r"(lines|edges|beams|points)\b.* left out", r"(solid elements|tetrahedra|hexahedra).* left out", r"curved faces?"
 NAMES = ["wall", "Wall 2", "Außenwänd", "Außenwönd", "côté-1", "in.let"]
 
 

@@ -18,7 +18,7 @@ mod tests;
 pub use dyadic::Dyadic;
 pub use hash::{IdMap, IdSet, STEP, mix};
 pub use hilbert::{HilbertFrame, hilbert_index};
-pub use number::short;
+pub use number::{count, counted, short};
 pub use pair::DoublePair;
 pub use point::{Aabb, Point};
 pub use sign::{

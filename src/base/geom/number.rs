@@ -12,9 +12,43 @@ pub fn short(x: f64) -> String {
     }
 }
 
+/// A count with its noun: `1 label`, `2 labels`.
+pub fn count(n: u64, what: &str) -> String {
+    match n {
+        1 => format!("1 {what}"),
+        n => match what {
+            "tetrahedron" => format!("{n} tetrahedra"),
+            "vertex" => format!("{n} vertices"),
+            _ => format!("{n} {what}s"),
+        },
+    }
+}
+
+/// A count with a sentence about it: `[vertex was|vertices were] left out` has the words for one and for several.
+pub fn counted(n: u64, sentence: &str) -> String {
+    let mut text = format!("{n} ");
+    let mut rest = sentence;
+    while let Some((before, (words, after))) =
+        rest.split_once('[').and_then(|(before, rest)| Some((before, rest.split_once(']')?)))
+    {
+        let (one, several) = words.split_once('|').unwrap_or((words, words));
+        text += before;
+        text += if n == 1 { one } else { several };
+        rest = after;
+    }
+    text + rest
+}
+
 #[cfg(test)]
 mod tests {
-    use super::short;
+    use super::{counted, short};
+
+    #[test]
+    fn one_is_no_plural() {
+        let text = "[vertex belongs|vertices belong] to no triangle and [was|were] left out";
+        assert_eq!(counted(1, text), "1 vertex belongs to no triangle and was left out");
+        assert_eq!(counted(0, text), "0 vertices belong to no triangle and were left out");
+    }
 
     #[test]
     fn four_digits_are_shown_and_no_idle_zeros() {

@@ -63,7 +63,7 @@ impl Surface {
         name: &str,
         scratch: &ScratchSpace,
     ) -> Result<(), SurfaceError> {
-        let first = self.add_labels(&other.label_names, name);
+        let first = self.add_labels(&other.label_names, &[], name);
         self.push_embedded(other, |label| first + label, scratch)?;
         self.add_support_triangles(scratch)
     }
@@ -93,6 +93,7 @@ impl Surface {
             let v = vert(v, &mut set.points);
             set.marks.push([v, named(label, &mut set.label_names)]);
         }
+        set.mark_lines.clone_from(&self.embedded.point_lines);
         set
     }
 
@@ -143,6 +144,8 @@ impl Surface {
             let ends = [a, b].map(|v| vert(&mut self.points, v));
             self.embedded.edges.push([ends[0], ends[1], label_of(label)]);
         }
+        self.embedded.point_lines.resize(self.embedded.points.len(), 0);
+        self.embedded.point_lines.extend_from_slice(&other.mark_lines);
         for &[v, label] in &other.marks {
             let v = vert(&mut self.points, v);
             self.embedded.points.push([v, label_of(label)]);
@@ -170,7 +173,7 @@ impl Surface {
         plain.drop_support_triangles();
         plain.embedded = Embedded::default();
         super::weld::drop_unused_points(&mut plain);
-        super::weld::drop_unused_labels(&mut plain);
+        super::label_sets::drop_unused_labels(&mut plain);
         plain
     }
 
@@ -215,8 +218,12 @@ impl Surface {
         self.name_of("edge", labels)
     }
 
-    /// Name of point `p` in messages: its number among the points of its label.
+    /// Name of point `p` in messages: its label and its line, or its number among the points of its label.
     pub fn point_name(&self, p: usize) -> String {
+        if let Some(&line @ 1..) = self.embedded.point_lines.get(p) {
+            let label = &self.label_names[self.embedded.points[p][1] as usize];
+            return format!("the point {label:?} in line {line} of its file");
+        }
         let labels = self.embedded.points[..=p].iter().map(|point| point[1]);
         self.name_of("point", labels)
     }

@@ -11,6 +11,8 @@ pub struct Embedded {
     pub edges: Vec<[u32; 3]>,
     /// The vertex of each point, and its label.
     pub points: Vec<[u32; 2]>,
+    /// The line of its file for each of the first points, 0 where it is not known.
+    pub point_lines: Vec<u32>,
     /// Largest edge length at each point; 0 for a vertex of triangles, which define it.
     pub sizes: Vec<f64>,
     /// The first support triangle, and the first vertex that only support triangles have.
@@ -26,6 +28,8 @@ pub struct EmbeddedSet {
     pub edges: Vec<[u32; 3]>,
     /// The vertices that are points, and their labels.
     pub marks: Vec<[u32; 2]>,
+    /// The line of the file for each of the first of these points, 0 where it is not known.
+    pub mark_lines: Vec<u32>,
     /// Names of the labels.
     pub label_names: Vec<String>,
 }
@@ -36,7 +40,8 @@ impl EmbeddedSet {
         let names = self.label_names.len() * 2 * size_of::<String>();
         let points = self.points.capacity() * size_of::<Point>();
         let edges = self.edges.capacity() * size_of::<[u32; 3]>();
-        (names + points + edges + self.marks.capacity() * size_of::<[u32; 2]>()) as u64
+        let marks = self.marks.capacity() * size_of::<[u32; 2]>() + 4 * self.mark_lines.capacity();
+        (names + points + edges + marks) as u64
     }
 }
 

@@ -1,7 +1,7 @@
 //! The input: a closed surface of triangles with labels, welded and validated exactly.
 //!
 //! Reading order: [`triangles`](Surface) (the surface), `weld` (building one), `cells` (one
-//! from volume cells), `polygon` (cutting polygons), `edges` (triangles at each edge),
+//! from volume cells), `label_sets` (triangles in several groups), `polygon` (cutting polygons), `edges` (triangles at each edge),
 //! `orientation` (turning triangles alike), `contact` (how two triangles touch), `boxes`, `box_pairs` and `stars`
 //! (pairs that may touch), `validate` (all checks), `defect` (errors and suggestions), `boundary_loops` (open edges),
 //! `weld_near` and `repair` (repair on demand), `fitness` (mesh quality that the triangles allow), `split` (finer
@@ -24,6 +24,7 @@ mod embedded;
 mod embedded_contact;
 mod embedded_set;
 mod fitness;
+mod label_sets;
 mod orientation;
 mod point_sizes;
 mod point_tree;

@@ -1,10 +1,12 @@
 //! Embedded sheets: triangles that become faces of the mesh with the same volume on both sides.
 
 use super::edges::{Facets, TriangleAtEdge};
+use super::label_sets::drop_unused_labels;
 use super::vertex_table::VertexTable;
-use super::weld::{drop_unused_labels, drop_unused_points};
+use super::weld::drop_unused_points;
 use super::{SourceFile, Surface, SurfaceError};
 use crate::storage::ScratchSpace;
+use tetdb_schema::labels::LabelSet;
 
 impl Surface {
     /// Returns whether triangle `t` is part of an embedded sheet.
@@ -69,7 +71,7 @@ impl Surface {
         }
         SurfaceError::check_size("vertices", self.points.len())?;
         SurfaceError::check_size("triangles", first + other.n_triangles())?;
-        let first_label = self.add_labels(&other.label_names, name);
+        let first_label = self.add_labels(&other.label_names, &other.label_sets, name);
         let triangles = other.triangles.iter();
         (self.triangles).extend(triangles.map(|t| t.map(|v| verts[v as usize])));
         (self.labels).extend(other.labels.iter().map(|label| first_label + label));
@@ -86,7 +88,7 @@ impl Surface {
     }
 
     /// Adds labels called `name:LABEL`, or `name` for one alone; a name that is taken gets a number. Returns the first one's number.
-    pub(super) fn add_labels(&mut self, labels: &[String], name: &str) -> u32 {
+    pub(super) fn add_labels(&mut self, labels: &[String], sets: &[LabelSet], name: &str) -> u32 {
         let first = self.label_names.len() as u32;
         for label in labels {
             let wanted = match labels.len() {
@@ -98,6 +100,7 @@ impl Surface {
             let free = [wanted.clone()].into_iter().chain(numbered).find(|n| !taken(n));
             self.label_names.extend(free);
         }
+        self.add_label_sets(first, sets);
         first
     }
 

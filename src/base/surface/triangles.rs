@@ -5,7 +5,8 @@ use std::mem::size_of;
 
 use super::Seed;
 use super::embedded_set::Embedded;
-use crate::geom::{Aabb, Point};
+use crate::geom::{Aabb, Point, counted};
+use tetdb_schema::labels::LabelSet;
 
 /// An indexed triangle surface with a label on each triangle.
 ///
@@ -24,6 +25,8 @@ pub struct Surface {
     pub labels: Vec<u32>,
     /// Names of the labels.
     pub label_names: Vec<String>,
+    /// Labels of triangles in several groups, ascending.
+    pub label_sets: Vec<LabelSet>,
     /// The files read, in order.
     pub files: Vec<SourceFile>,
     /// True if each triangle is part of an embedded sheet; empty where none is.
@@ -173,7 +176,7 @@ pub enum NoteKind {
         /// Number of regions.
         n: u64,
     },
-    /// Groups some of whose faces belong to another group too, which gives them their label.
+    /// Groups some of whose volumes belong to another group too, which gives them their name.
     OtherGroups {
         /// Names of the groups.
         names: String,
@@ -209,35 +212,66 @@ pub enum VolumePoints {
     Regions,
 }
 
+impl NoteKind {
+    /// A count, and a sentence about it for [`counted`].
+    fn sentence(&self) -> Option<(u64, &'static str)> {
+        Some(match self {
+            Self::WeldedVertices { n } => (
+                *n,
+                "[vertex repeats|vertices repeat] the coordinates of another and [was|were] joined to it",
+            ),
+            Self::UnusedVertices { n } => {
+                (*n, "[vertex belongs|vertices belong] to no triangle and [was|were] left out")
+            }
+            Self::FannedPolygons { n } => {
+                (*n, "[polygon was|polygons were] cut into triangles from the first vertex")
+            }
+            Self::RepeatedCorners { n } => {
+                (*n, "[polygon repeats|polygons repeat] a corner, which was left out")
+            }
+            Self::CutPolygons { n } => (
+                *n,
+                "[polygon|polygons] with dents or corners in line [was|were] cut into the triangles of the plane",
+            ),
+            Self::MixedRegions { n } => (
+                *n,
+                "[region holds|regions hold] elements of several groups with no triangles between them, and [gets|get] no name",
+            ),
+            Self::TrailingBytes { n } => {
+                (*n, "[byte|bytes] behind the declared content [was|were] left out")
+            }
+            Self::CurvedFaces { n } => (
+                *n,
+                "[curved face was taken as a flat one|curved faces were taken as flat ones] between the corners",
+            ),
+            Self::CutFacets { n } => {
+                (*n, "[facet|facets] of several polygons or with holes [was|were] cut as a whole")
+            }
+            Self::Edges { n } => (
+                *n,
+                "[polygon of two corners is an edge|polygons of two corners are edges], embedded where the surface is meshed",
+            ),
+            _ => return None,
+        })
+    }
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.file.is_empty() {
             write!(f, "{}: ", self.file)?;
         }
+        if let Some((n, sentence)) = self.kind.sentence() {
+            return f.write_str(&counted(n, sentence));
+        }
         match &self.kind {
             NoteKind::MissingEndsolid { line } => {
                 write!(f, "the text ends at line {line} without `endsolid`; all facets were read")
             }
-            NoteKind::WeldedVertices { n } => {
-                write!(f, "{n} vertices repeat the coordinates of another and were joined to it")
-            }
-            NoteKind::UnusedVertices { n } => {
-                write!(f, "{n} vertices belong to no triangle and were left out")
-            }
-            NoteKind::FannedPolygons { n } => {
-                write!(f, "{n} polygons were cut into triangles from their first vertex")
-            }
-            NoteKind::RepeatedCorners { n } => {
-                write!(f, "{n} polygons repeat a corner, which was left out")
-            }
-            NoteKind::CutPolygons { n } => {
-                write!(
-                    f,
-                    "{n} polygons with dents or corners in line were cut into the triangles of their plane"
-                )
-            }
             NoteKind::SkippedElements { what, n } => {
-                write!(f, "{n} {what} were left out; only the surface is read")
+                let words = if *n == 1 { "of the " } else { "" };
+                let was = if *n == 1 { "was" } else { "were" };
+                write!(f, "{n} {words}{what} {was} left out; only the surface is read")
             }
             NoteKind::VolumePoints { points, n } => {
                 let (what, use_of) = match points {
@@ -246,36 +280,16 @@ impl fmt::Display for Note {
                 };
                 write!(f, "{what} ({n}) {use_of}, unless another rule fills regions")
             }
-            NoteKind::BoundaryOfCells { n } => write!(
-                f,
-                "the boundary of {n} volume cells, and faces between their regions, are the surface"
-            ),
-            NoteKind::Said(text) => f.write_str(text),
-            NoteKind::MixedRegions { n } => {
-                write!(
-                    f,
-                    "{n} regions hold elements of several groups with no triangles between them, and get no name"
-                )
+            NoteKind::BoundaryOfCells { n } => {
+                let cells = counted(*n, "volume [cell|cells]");
+                write!(f, "the boundary of {cells}, and faces between regions, are the surface")
             }
             NoteKind::OtherGroups { names } => write!(
                 f,
-                "faces of the groups {names} belong to another group before, and have its label"
+                "volumes of the groups {names} belong to another group before, and have its name"
             ),
-            NoteKind::TrailingBytes { n } => {
-                write!(f, "{n} bytes behind the declared content were left out")
-            }
-            NoteKind::CurvedFaces { n } => {
-                write!(f, "{n} curved faces were taken as flat ones between their corners")
-            }
-            NoteKind::CutFacets { n } => {
-                write!(f, "{n} facets of several polygons or with holes were cut as a whole")
-            }
-            NoteKind::Edges { n } => {
-                write!(
-                    f,
-                    "{n} polygons of two corners are edges, embedded where the surface is meshed"
-                )
-            }
+            NoteKind::Said(text) => f.write_str(text),
+            _ => Ok(()),
         }
     }
 }

@@ -136,13 +136,13 @@ impl EnclosedVolumes {
         }
     }
 
-    /// The volumes that triangles of a label enclose: of the two at each the one farther from the outside, both where they are equally far.
-    pub fn enclosed_by(&self, surface: &Surface, label: u32) -> BTreeSet<u32> {
+    /// The volumes that triangles of labels enclose: of the two at each the one farther from the outside, both where they are equally far.
+    pub fn enclosed_by(&self, surface: &Surface, labels: &[u32]) -> BTreeSet<u32> {
         let depths = self.depths();
         let depth = |v: u32| depths[v as usize];
         let mut found = BTreeSet::new();
-        for (&[front, back], _) in
-            (self.of_side.iter().zip(&surface.labels)).filter(|([f, b], l)| **l == label && f != b)
+        for (&[front, back], _) in (self.of_side.iter().zip(&surface.labels))
+            .filter(|([f, b], l)| labels.contains(l) && f != b)
         {
             let deepest = depth(front).max(depth(back));
             found.extend([front, back].into_iter().filter(|&v| depth(v) == deepest));

@@ -1,7 +1,8 @@
 //! Builds a surface while files are read: welding, labels, fans.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
+use super::label_sets::{JOIN_BYTES, LabelNumbers, drop_unused_labels};
 use super::polygon::{cut_facet, cut_polygon};
 use super::vertex_table::VertexTable;
 use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
@@ -17,7 +18,9 @@ use crate::storage::{filled, push};
 pub struct SurfaceBuilder {
     surface: Surface,
     table: VertexTable,
-    label_ids: HashMap<String, u32>,
+    labels: LabelNumbers,
+    /// Triangles listed in several groups are to become one each.
+    joins_groups: bool,
     file: String,
     triangle_first: usize,
     /// Vertices, notes and seeds before this file.
@@ -36,6 +39,9 @@ pub struct SurfaceBuilder {
     uncut: Vec<[u32; 2]>,
     /// Triangles of this file are given by position, not by the file's vertex numbers.
     by_position: bool,
+    /// Ends of edges of this file that are embedded later, by the file's numbers, and those of all files before.
+    edge_ends: Vec<u32>,
+    embedded: HashSet<u32>,
     /// Bytes it may hold; `None` for as many as there are.
     bytes_max: Option<u64>,
 }
@@ -82,7 +88,7 @@ impl SurfaceBuilder {
         self.before = [surface.points.len(), surface.notes.len(), surface.seeds.len()];
         self.file2vert.clear();
         (self.n_welded, self.n_fanned, self.n_cut, self.n_repeated) = (0, 0, 0, 0);
-        self.by_position = false;
+        (self.by_position, self.joins_groups) = (false, false);
         self.uncut.clear();
         self.surface
             .files
@@ -139,13 +145,26 @@ impl SurfaceBuilder {
 
     /// The id of the label `name`, which is added if new.
     pub fn label(&mut self, name: &str) -> u32 {
-        if let Some(&id) = self.label_ids.get(name) {
-            return id;
+        self.labels.label(&mut self.surface, name)
+    }
+
+    /// The label of triangles in all groups of these labels, of which there is one at least.
+    pub fn label_of_all(&mut self, labels: &[u32]) -> u32 {
+        self.labels.label_of_all(&mut self.surface, labels)
+    }
+
+    /// Makes one triangle of those that this file lists once for each of their groups.
+    pub fn join_groups_at_end(&mut self) {
+        self.joins_groups = true;
+    }
+
+    fn join_groups(&mut self) -> Result<(), SurfaceError> {
+        let labels = &self.surface.labels[self.triangle_first..];
+        if self.joins_groups && labels.iter().any(|label| *label != labels[0]) {
+            self.check_more(JOIN_BYTES * labels.len() as u64)?;
+            self.labels.join_triangles(&mut self.surface, self.triangle_first);
         }
-        let id = self.surface.label_names.len() as u32;
-        self.surface.label_names.push(name.to_owned());
-        self.label_ids.insert(name.to_owned(), id);
-        id
+        Ok(())
     }
 
     /// Adds a triangle of vertices of the file.
@@ -160,6 +179,11 @@ impl SurfaceBuilder {
         push(&mut self.surface.triangles, corners);
         push(&mut self.surface.labels, label);
         Ok(())
+    }
+
+    /// Counts the ends of an edge, which is embedded later, as used.
+    pub fn edge(&mut self, ends: [u32; 2]) {
+        self.edge_ends.extend(ends);
     }
 
     /// Adds a polygon of at least three vertices of the file: a fan from its first one where that is right, else other triangles of its
@@ -363,6 +387,7 @@ impl SurfaceBuilder {
     /// The first triangle and vertex number without a vertex, as [`SurfaceError::NoSuchVertex`].
     pub fn end_file(&mut self) -> Result<(), SurfaceError> {
         self.cut_late()?;
+        self.join_groups()?;
         if !self.by_position {
             let map = &self.file2vert;
             for (i, triangle) in
@@ -377,6 +402,8 @@ impl SurfaceBuilder {
                 }
             }
         }
+        let ends = self.edge_ends.drain(..).filter_map(|v| self.file2vert.get(v as usize));
+        self.embedded.extend(ends);
         if self.n_welded > 0 {
             self.note(NoteKind::WeldedVertices { n: self.n_welded });
         }
@@ -397,12 +424,17 @@ impl SurfaceBuilder {
     pub fn finish(self) -> Surface {
         let mut surface = self.surface;
         drop(self.table);
-        let n_unused = drop_unused_points(&mut surface);
+        let mut own_ends = self.embedded;
+        if !own_ends.is_empty() {
+            surface.triangles.iter().flatten().for_each(|v| _ = own_ends.remove(v));
+        }
+        let n_unused = drop_unused_points(&mut surface) - own_ends.len() as u64;
         if n_unused > 0 {
             let file = surface.files.first().map_or(String::new(), |f| f.name.clone());
             surface.notes.push(Note { file, kind: NoteKind::UnusedVertices { n: n_unused } });
         }
         drop_unused_labels(&mut surface);
+        surface.name_label_sets(0);
         surface
     }
 }
@@ -430,29 +462,4 @@ pub(super) fn drop_unused_points(surface: &mut Surface) -> u64 {
         }
     }
     n_unused as u64
-}
-
-/// Keeps the labels that triangles carry, in their order.
-pub(super) fn drop_unused_labels(surface: &mut Surface) {
-    let mut used = vec![false; surface.label_names.len()];
-    for &label in &surface.labels {
-        used[label as usize] = true;
-    }
-    if used.iter().all(|&u| u) {
-        return;
-    }
-    let mut next = 0;
-    let new_ids: Vec<u32> = used
-        .iter()
-        .map(|&u| {
-            let id = next;
-            next += u32::from(u);
-            id
-        })
-        .collect();
-    let mut keep = used.iter();
-    surface.label_names.retain(|_| *keep.next().expect("one flag per label"));
-    for label in &mut surface.labels {
-        *label = new_ids[*label as usize];
-    }
 }

@@ -11,7 +11,7 @@ use super::{ShapeArgs, SheetArgs};
     tetdb mesh sample:balls,count=100 -o balls.tetdb"
 )]
 pub struct MeshArgs {
-    /// Surface files (STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen), boundary-of:FILE for that of volume cells, or a sample such as
+    /// Surface files (STL, PLY, OBJ, OFF, 3MF, GIFTI, MEDIT, Gmsh, TetGen, VTK, Abaqus, Nastran, I-DEAS), boundary-of:FILE for that of volume cells, or a sample such as
     /// sample:balls,count=100
     #[arg(required = true, value_name = "SURFACE")]
     pub surfaces: Vec<String>,

@@ -17,7 +17,7 @@ pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
 pub use query::QueryArgs;
 pub use resaturate::ResaturateArgs;
 pub use run::RunArgs;
-pub use shape::{ShapeArgs, SizeArgs};
+pub use shape::{InsideArgs, ShapeArgs, SizeArgs};
 pub use show::{CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
 pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
 pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs, SheetArgs};

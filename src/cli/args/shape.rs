@@ -45,7 +45,7 @@ pub struct SizeArgs {
     /// Edge length in a box, and at most OUTSIDE away from it; may be repeated
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1,H[,OUTSIDE]", allow_hyphen_values = true)]
     pub size_box: Vec<String>,
-    /// Edge length in a sphere, and at most OUTSIDE away from it; may be repeated
+    /// Edge length in a sphere, and at most OUTSIDE away from it; R may be a share such as 2%; may be repeated
     #[arg(long, value_name = "X,Y,Z,R,H[,OUTSIDE]", allow_hyphen_values = true)]
     pub size_sphere: Vec<String>,
     /// Edge length in a cylinder around the axis between two points; may be repeated
@@ -54,12 +54,28 @@ pub struct SizeArgs {
     /// Edge length in a region, by its number in `tetdb info` or a label of triangles around it; may be repeated
     #[arg(long, value_name = "REGION_OR_LABEL,H", allow_hyphen_values = true)]
     pub size_region: Vec<String>,
-    /// Edge lengths at the vertices of a mesh: a MEDIT .sol with its background .mesh of tetrahedra beside it, or with one length for each of the surface's vertices
+    /// Edge length on triangles with a label, growing away from them, or from DISTANCE on; may be repeated
+    #[arg(long, value_name = "LABEL,H[,DISTANCE]", allow_hyphen_values = true)]
+    pub size_label: Vec<String>,
+    /// Edge lengths at the vertices of a mesh: a MEDIT .sol with its background .mesh of tetrahedra beside it, or with one length for each of the surface's vertices; or .csv, .npy, .msh, .vtu, .mtr
     #[arg(long, value_name = "FILE")]
     pub size_field: Option<String>,
     /// Edge length as an expression in x, y and z, such as 'max(0.02, 0.1*sqrt(x^2+y^2))'
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     pub size_expr: Option<String>,
+}
+
+/// Treatment of embedded edges and points.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Inside the surface")]
+pub struct InsideArgs {
+    /// Move embedded points and ends of embedded edges onto triangles nearer than this, and divide the triangles there: a length, or 1%
+    /// of the box diagonal
+    #[arg(long, value_name = "DIST", allow_hyphen_values = true)]
+    pub snap_embedded: Option<String>,
+    /// Treatment of embedded points and edges outside the filled regions [default: error]
+    #[arg(long, value_name = "HOW", value_parser = word_of::<EmbedOutside>(OUTSIDE))]
+    pub embed_outside: Option<EmbedOutside>,
 }
 
 /// What shapes the mesh, besides the surface.
@@ -74,18 +90,8 @@ pub struct ShapeArgs {
     /// without moving the surface
     #[arg(long, help_heading = "Sizes")]
     pub refine_surface: bool,
-    /// Move embedded points and ends of embedded edges onto triangles nearer than this, and divide the triangles there: a length, or 1%
-    /// of the box diagonal
-    #[arg(
-        long,
-        value_name = "DIST",
-        allow_hyphen_values = true,
-        help_heading = "Inside the surface"
-    )]
-    pub snap_embedded: Option<String>,
-    /// Treatment of embedded points and edges outside the filled regions [default: error]
-    #[arg(long, value_name = "HOW", value_parser = word_of::<EmbedOutside>(OUTSIDE), help_heading = "Inside the surface")]
-    pub embed_outside: Option<EmbedOutside>,
+    #[command(flatten)]
+    pub inside: InsideArgs,
     /// Which regions to fill [default: what the surface's files say, else parity; with seeds or holes: seeds]
     #[arg(long, value_name = "RULE", value_parser = word_of::<Regions>(REGIONS), help_heading = "Regions")]
     pub regions: Option<Regions>,

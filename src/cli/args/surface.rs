@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use super::shape::InsideArgs;
+
 /// Sheets inside the surface.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Inside the surface")]
@@ -33,7 +35,7 @@ impl SheetArgs {
 /// What is wrong with a surface, and what mesh it allows. Nothing is changed unless --repair is given.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  tetdb check part.stl\n  tetdb check part.stl --json\n  tetdb check part.stl --write-bad bad.vtu\n  \
+    after_help = "Examples:\n  tetdb check part.stl\n  tetdb check part.stl --json\n  tetdb check part.stl --write-bad bad.vtu\n  tetdb check part.stl --embed-points sensors.csv --embed-outside skip\n  \
     tetdb check part.stl --repair --write fixed.stl\n  tetdb check part.stl --repair --weld 1e-6 --write fixed.stl\n\n\
     Exit code 0: the surface can be meshed; 3: it has defects. With --repair this is said of what was written."
 )]
@@ -43,6 +45,8 @@ pub struct CheckArgs {
     pub surfaces: Vec<String>,
     #[command(flatten)]
     pub sheets: SheetArgs,
+    #[command(flatten)]
+    pub inside: InsideArgs,
     /// Write the defective triangles to this .vtu file, the kind of defect as cell data
     #[arg(long, value_name = "FILE")]
     pub write_bad: Option<PathBuf>,

@@ -120,7 +120,7 @@ impl<'s> Query<'s> {
         Ok(self)
     }
 
-    /// Selects tetrahedra on an input triangle with one of these labels. Labels are positions in
+    /// Selects tetrahedra on an input triangle with one of these labels, or in the groups of one. Labels are positions in
     /// [`Summary::labels`](super::Summary::labels).
     pub fn on_labels(mut self, labels: &[u32]) -> Self {
         self.selection.labels = Some(labels.to_vec());

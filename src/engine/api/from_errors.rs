@@ -130,10 +130,13 @@ impl From<SizingError> for Error {
             SizingError::BadValue {
                 option: "size_box" | "size_sphere" | "size_cylinder", ..
             } => {
-                "coordinates and radii are numbers in the surface's own unit; only lengths of edges can also be shares, such as 1%"
+                "coordinates are numbers in the surface's own unit; radii and lengths of edges can also be shares, such as 1%"
             }
             SizingError::BadRegion { .. } | SizingError::BadValue { option: "size_region", .. } => {
                 "name a region by its number or name, or by a label of triangles around it, then a comma and a length such as 0.5 or 1%"
+            }
+            SizingError::BadLabel { .. } | SizingError::BadValue { option: "size_label", .. } => {
+                "name a label of triangles, then a comma and a length such as 0.5 or 1%; a second length says how far from the label the first holds"
             }
             SizingError::BadFormula { .. } | SizingError::NoSize { .. } => {
                 "an expression in x, y and z that is a length everywhere in the surface's box, such as 0.05+0.1*abs(z)"

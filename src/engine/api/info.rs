@@ -14,6 +14,7 @@ use tetdb_schema::catalog::{
     SubdomainState, SurfaceSource,
 };
 use tetdb_schema::digest::Digest;
+use tetdb_schema::labels::LabelSet;
 use tetdb_store::store::Catalog;
 
 /// The record of a store.
@@ -36,6 +37,8 @@ pub struct StoreInfo {
     pub tool_version: String,
     /// Names of the labels. A label is a position in this list.
     pub labels: Vec<String>,
+    /// Labels of triangles in several groups, and the labels of those; none where no triangle is in two.
+    pub label_sets: Vec<LabelSet>,
     /// Embedded edges and points by label.
     pub wires: Vec<EmbeddedInfo>,
     /// Regions by number, including empty ones.
@@ -174,6 +177,7 @@ impl StoreInfo {
             options: serde_json::from_str(&job.options).unwrap_or(Value::Null),
             tool_version: job.tool_version,
             labels: catalog.labels()?,
+            label_sets: catalog.label_sets()?,
             wires: embedded(catalog)?,
             regions: regions(catalog)?,
             tets: rows.iter().map(|r| r.tets).sum(),

@@ -15,7 +15,7 @@ use super::{
     Surface, Verification, guarded, job, replace, verify,
 };
 use crate::pipeline::{self, MeshOptions, Options, PipelineError, Prepared, RECIPE};
-use tetdb_base::geom::Point;
+use tetdb_base::geom::{Point, count};
 use tetdb_base::storage::{Budget, CancelToken, ScratchSpace, attempt, n_threads};
 use tetdb_base::surface::{self, Seed, SeedKind};
 use tetdb_schema::catalog::StoreState;
@@ -540,7 +540,7 @@ fn skips_outer(surface: &Surface, options: &Options) -> bool {
 }
 
 /// Leaves out embedded edges and points of a surface without defects that are outside the filled regions.
-fn leave_out(
+pub(super) fn leave_out(
     surface: &mut Surface,
     options: &Options,
     scratch: &ScratchSpace,
@@ -551,9 +551,9 @@ fn leave_out(
         return Ok(());
     }
     settings.note(format!(
-        "note: {} edges and {} points outside the filled regions were left out",
-        outer.edges.len(),
-        outer.points.len()
+        "note: {} and {} outside the filled regions were left out",
+        count(outer.edges.len() as u64, "edge"),
+        count(outer.points.len() as u64, "point")
     ));
     surface.without_wires(&outer.edges, &outer.points, scratch)
 }

@@ -7,7 +7,9 @@ use super::Error;
 use super::field_arrays::{FieldArrays, IN_STORE};
 use crate::pipeline::SizeFile;
 use tetdb_base::geom::Point;
-use tetdb_kernel::sizing::{Formula, Length, RegionSize, SizeOptions, SizeSource, SourceShape};
+use tetdb_kernel::sizing::{
+    Formula, LabelSize, Length, RegionSize, SizeOptions, SizeSource, SourceShape,
+};
 
 /// Wanted edge lengths: the lengths of the surface's own edges, and the sizes given here. The least of all counts.
 ///
@@ -66,7 +68,7 @@ impl Sizes {
         outside: Option<Length>,
     ) -> Self {
         let center = Point::from_array(center);
-        self.with_shape(SourceShape::Sphere { center, radius }, h, outside)
+        self.with_shape(SourceShape::Sphere { center, radius: Length::Units(radius) }, h, outside)
     }
 
     /// Wants `h` in a cylinder around the axis from `a` to `b`. Outside the cylinder, lengths grow, or are at most `outside`.
@@ -79,12 +81,18 @@ impl Sizes {
         outside: Option<Length>,
     ) -> Self {
         let ends = [a, b].map(Point::from_array);
-        self.with_shape(SourceShape::Cylinder { ends, radius }, h, outside)
+        self.with_shape(SourceShape::Cylinder { ends, radius: Length::Units(radius) }, h, outside)
     }
 
     /// Wants at most `h` in a region, given by its number, its name or a label on it.
     pub fn in_region(mut self, region_or_label: &str, h: Length) -> Self {
         self.sizes.regions.push(RegionSize { which: region_or_label.trim().to_owned(), h });
+        self
+    }
+
+    /// Wants at most `h` on the triangles of a label and up to `distance` from them; from there lengths grow.
+    pub fn near_label(mut self, label: &str, h: Length, distance: Option<Length>) -> Self {
+        self.sizes.labels.push(LabelSize { label: label.trim().to_owned(), h, distance });
         self
     }
 
@@ -155,12 +163,14 @@ mod tests {
             .in_sphere([0.5, -1e-7, 0.0], 0.1, Length::units(0.01), None)
             .in_cylinder([0.0; 3], [1.0; 3], 0.25, Length::units(0.1), None)
             .expression("x + 1")
-            .in_region("rock, wet", Length::units(0.25));
+            .in_region("rock, wet", Length::units(0.25))
+            .near_label("7,3", Length::units(0.25), None);
         let options = sizes.options().expect("good sizes");
         let text = OptionsText::from_sizes(&options, None);
         assert_eq!(text.hsiz.as_deref(), Some("2%"));
         assert_eq!(text.size_sphere, ["0.5,-0.0000001,0,0.1,0.01"]);
         assert_eq!(text.size_region, ["rock, wet,0.25"]);
+        assert_eq!(text.size_label, ["7,3,0.25,0"]);
         assert_eq!(text.sizes(), Ok(options));
         for bad in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
             let bad = Length::units(bad);

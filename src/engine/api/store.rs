@@ -7,6 +7,7 @@ use super::guard::guarded_in;
 use super::{Error, Event, Settings, Surface, Verification, VerifyLevel, job, verify};
 use tetdb_base::storage::RunContext;
 use tetdb_schema::catalog::{InterfaceRow, RegionRow, StoreState, SubdomainRow};
+use tetdb_schema::labels::LabelSet;
 use tetdb_store::audit::Level;
 use tetdb_store::query::QuerySession;
 use tetdb_store::sealed::Subdomain;
@@ -69,6 +70,8 @@ pub struct Summary {
     pub input_triangles: Option<u64>,
     /// Names of the labels. A label is a position in this list.
     pub labels: Vec<String>,
+    /// Labels of triangles in several groups, and the labels of those; none where no triangle is in two.
+    pub label_sets: Vec<LabelSet>,
     /// Regions by number, including empty ones.
     pub regions: Vec<RegionRow>,
     /// Names of regions 1, 2, …; empty for a region without a name. No elements if no region has a name.
@@ -236,6 +239,7 @@ impl Summary {
             worst_quality: worst.fold(0.0, f64::max),
             input_triangles: catalog.n_input_triangles()?,
             labels: catalog.labels()?,
+            label_sets: catalog.label_sets()?,
             regions: catalog.regions()?,
             region_names: catalog.region_names()?,
             interfaces: catalog.interfaces()?,

@@ -119,7 +119,7 @@ pub(super) fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<()
 impl Surface {
     /// Reads files as one surface. Each file is one label, unless the file has labels of its own.
     ///
-    /// Formats: STL, PLY, OBJ, OFF, MEDIT, Gmsh and TetGen, also compressed as `.gz` or `.zst`, and pipes.
+    /// Formats: STL, PLY, OBJ, OFF, 3MF, GIFTI, MEDIT, Gmsh, TetGen, VTK, Abaqus, Nastran and I-DEAS, also compressed as `.gz` or `.zst`, and pipes.
     ///
     /// Errors: a file that cannot be read, with the line or byte.
     pub fn read<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> Result<Self, Error> {
@@ -358,8 +358,10 @@ impl Surface {
     pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.inner.notes.iter().map(ToString::to_string).collect();
         if self.turned > 0 {
-            notes
-                .push(format!("{} triangles were turned to run like their neighbors", self.turned));
+            notes.push(match self.turned {
+                1 => "1 triangle was turned to run like its neighbors".to_owned(),
+                n => format!("{n} triangles were turned to run like their neighbors"),
+            });
         }
         notes
     }

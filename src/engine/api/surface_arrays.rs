@@ -1,9 +1,11 @@
 //! The vertices, triangles and labels of a surface as arrays, and surfaces from arrays of other cells than triangles.
 
+use super::surface::given;
 use super::{Error, Settings, Surface, guarded};
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{CellBoundary, Note, NoteKind, Seed, SeedKind, SurfaceBuilder};
 use tetdb_schema::code::Code;
+use tetdb_schema::labels::LabelSet;
 
 /// Cells of several kinds as arrays.
 #[derive(Clone, Copy, Debug)]
@@ -125,6 +127,34 @@ impl Surface {
         let kind = NoteKind::Said(text.into());
         self.inner.notes.push(Note { file, kind });
         self
+    }
+
+    /// The same surface with triangles in several groups: those of a label have the labels of its groups instead.
+    ///
+    /// Each item is the name of a label and the names of its groups, one at least. Labels get new numbers; a label that stands for
+    /// several is called by their names with `+` between them. Errors: `count-mismatch` for a label without
+    /// groups; `usage` if something is embedded.
+    pub fn with_groups(mut self, groups: &[(&str, &[&str])]) -> Result<Self, Error> {
+        if let Some((label, _)) = groups.iter().find(|(_, groups)| groups.is_empty()) {
+            let message = format!("the label {label:?} has no group");
+            return Err(
+                Error::new(Code::CountMismatch, message).with_help("give one group at least")
+            );
+        }
+        if self.inner.has_sheets() || self.inner.has_embedded() {
+            let message = "groups are given before sheets, edges and points are embedded";
+            return Err(Error::new(Code::Usage, message));
+        }
+        if !groups.is_empty() {
+            self.inner.divide_labels(groups);
+            self.sources = vec![given(&self.inner)];
+        }
+        Ok(self)
+    }
+
+    /// Labels of triangles in several groups, and the labels of those groups.
+    pub fn label_sets(&self) -> &[LabelSet] {
+        &self.inner.label_sets
     }
 
     /// Positions of the vertices; vertices with equal coordinates appear once.

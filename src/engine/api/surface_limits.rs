@@ -2,8 +2,11 @@
 
 use std::path::Path;
 
+use super::job::take_seeds;
+use super::mesher::leave_out;
 use super::surface::refine;
-use super::{Error, Length, Settings, Surface, guarded};
+use super::{EmbedOutside, Error, Length, Settings, Surface, guarded};
+use crate::pipeline::{Options, refuse_outer};
 use tetdb_base::storage::attempt;
 use tetdb_base::surface::{SplitReport, validate_with};
 use tetdb_io::read::WireKind as EmbeddedKind;
@@ -71,6 +74,32 @@ impl Surface {
         guarded(settings, || {
             let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
             Ok(attempt(|| validate_with(&self.inner, &scratch))?.accept()?)
+        })
+    }
+
+    /// Finds what is embedded outside the regions that are filled without further options, as a run does; of a surface with defects nothing.
+    ///
+    /// Effects: as `outside` says, edges and points there are left out, with a note. Errors: `sheet-outside`, `wire-outside`.
+    pub fn inside_settled(
+        mut self,
+        outside: EmbedOutside,
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        if !self.inner.has_embedded() && !self.inner.has_sheets() {
+            return Ok(self);
+        }
+        guarded(settings, || {
+            let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
+            if !attempt(|| validate_with(&self.inner, &scratch))?.is_valid() {
+                return Ok(self);
+            }
+            let mut options = Options::default();
+            take_seeds(&mut options.mesh, &self.inner);
+            if outside == EmbedOutside::Skip && self.inner.has_embedded() {
+                leave_out(&mut self, &options, &scratch, settings)?;
+            }
+            attempt(|| refuse_outer(&self.inner, &options, &scratch))??;
+            Ok(self)
         })
     }
 

@@ -239,7 +239,7 @@ impl<'a> SurfaceReport<'a> {
         }
         json!({
             "triangles": surface.n_triangles(), "vertices": surface.n_vertices(),
-            "labels": surface.label_names, "bounds": bounds, "turned_triangles": self.n_turned,
+            "labels": surface.label_names, "label_sets": surface.label_sets, "bounds": bounds, "turned_triangles": self.n_turned,
             "edges": edges.n_edges, "parts": edges.n_components, "open_edges": edges.open.len(),
             "nonmanifold_edges": edges.n_nonmanifold, "two_sided_triangles": edges.two_sided.len(),
             "valid": self.is_valid(), "n_defects": found.n_defects,

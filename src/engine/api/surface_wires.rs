@@ -194,7 +194,12 @@ impl Surface {
         if done.moved > 0 {
             let Divided { moved, farthest, .. } = done;
             let text = format!(
-                "{moved} embedded points or ends of edges were moved onto the surface, by {farthest:.1e} at most"
+                "{moved} embedded {} moved onto the surface, by {farthest:.1e} at most",
+                if moved == 1 {
+                    "point or end of an edge was"
+                } else {
+                    "points or ends of edges were"
+                }
             );
             let (file, kind) = (name.to_owned(), NoteKind::Said(text));
             self.inner.notes.push(Note { file, kind });
@@ -236,6 +241,7 @@ impl Surface {
         }
         let wires = &mut self.inner.embedded;
         leave_out(&mut wires.edges, edges);
+        leave_out(&mut wires.point_lines, points);
         leave_out(&mut wires.points, points);
         if !self.inner.has_embedded() {
             self.inner = self.inner.without_embedded();

@@ -7,6 +7,7 @@ use super::SurfaceSink;
 use super::feed::{Feed, Result, name};
 use super::tetgen::read_node_file;
 use super::volume_cells::VolumeCells;
+use tetdb_base::geom::counted;
 use tetdb_base::surface::{NoteKind, Seed, SeedKind};
 use tetdb_schema::source::BOUNDARY_OF;
 
@@ -60,11 +61,17 @@ impl SurfaceSink<'_> {
             self.builder.note(NoteKind::BoundaryOfCells { n });
         }
         for (n, what) in [
-            (n_faces, "surface cells were left out; the boundary of the volume cells is read"),
-            (n_curved, "cells have nodes on their edges; they were taken by their corners alone"),
+            (
+                n_faces,
+                "surface [cell was|cells were] left out; the boundary of the volume cells is read",
+            ),
+            (
+                n_curved,
+                "[cell has nodes on its|cells have nodes on their] edges; only corners were taken",
+            ),
         ] {
             if n > 0 {
-                self.builder.note(NoteKind::Said(format!("{n} {what}")));
+                self.builder.note(NoteKind::Said(counted(n, what)));
             }
         }
         Ok(())
@@ -188,7 +195,7 @@ mod tests {
         let file = [("a.mesh", MEDIT)];
         assert_eq!(read(&file, "").unwrap().n_triangles(), 1);
         let boundary = read(&file, BOUNDARY_OF).unwrap();
-        check(&boundary, 7, &["ref_1", "ref_1-ref_2", "ref_2"], 2, "1 surface cells were left out");
+        check(&boundary, 7, &["ref_1", "ref_1-ref_2", "ref_2"], 2, "1 surface cell was left out");
         for (name, text) in
             [("a.mesh", MEDIT.split("Tetrahedra").next().unwrap()), ("a.off", "OFF\n")]
         {

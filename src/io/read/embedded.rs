@@ -6,7 +6,7 @@ use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::error::{FilePlace, ReadFault};
 use super::feed::Result;
 use super::open::{open, stem, unpacked_name};
-use super::{PointColumns, PointRow, PointTable, obj, tetgen, vtk};
+use super::{PointColumns, PointRow, PointTable, Spot, obj, tetgen, vtk};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{EmbeddedSet, Seed};
 
@@ -53,6 +53,10 @@ fn read_table(path: &Path, cap: u64, sink: &mut EmbeddedSink) -> Result<()> {
         let PointRow { numbers: [x, y, z, _], name, place } = row?;
         let label = sink.label(&name);
         let v = sink.set.points.len() as u32;
+        sink.set.mark_lines.push(match place.spot {
+            Spot::Line(line) => u32::try_from(line).unwrap_or_default(),
+            _ => 0,
+        });
         let added = sink.mark(v, label).and_then(|()| sink.point(Point::new(x, y, z)));
         added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
     }

@@ -1,10 +1,12 @@
-//! Faces and nodes of files of finite elements: Abaqus `.inp`, Nastran `.nas` and `.bdf`. I-DEAS is in `unv`.
+//! Faces and nodes of files of finite elements: Nastran `.nas` and `.bdf`. Abaqus is in `abaqus`, I-DEAS in `unv`.
 //!
 //! Each reads shells, membranes and flat elements as faces; curved ones by their corners. Solid elements name regions, beams are left
 //! out with a note. What would move nodes, such as other coordinate systems, is refused.
 
+use std::collections::HashMap;
 use std::io::BufRead;
 
+use super::element_sets::ElementSets;
 use super::feed::{Feed, Result, parse, quote};
 use super::gmsh_numbers::NodeTags;
 use super::solids::Solids;
@@ -26,8 +28,23 @@ pub(super) struct Elements<'a, 'b> {
     pub(super) solids: Solids,
     pub(super) n_thin: u64,
     pub(super) n_curved: u64,
-    /// Faces to come with the place that names them, for files with elements before nodes or groups.
-    pub(super) faces: Vec<(i64, Vec<i64>, String, FilePlace)>,
+    /// Faces to come, for files with elements before nodes or groups.
+    pub(super) faces: Vec<Face>,
+    /// Those of them whose corners are vertices of the file, no longer numbers of nodes.
+    n_with_vertices: usize,
+    /// Parts before this one.
+    pub(super) part: u32,
+    pub(super) sets: ElementSets,
+}
+
+/// A face and the place that names it.
+pub(super) struct Face {
+    part: u32,
+    id: i64,
+    corners: Vec<i64>,
+    /// The set it is in anyway.
+    set: Option<u32>,
+    place: FilePlace,
 }
 
 pub(super) fn unexpected(place: &FilePlace, expected: &str, found: impl AsRef<[u8]>) -> ReadError {
@@ -50,6 +67,9 @@ impl<'a, 'b> Elements<'a, 'b> {
             n_thin: 0,
             n_curved: 0,
             faces: Vec::new(),
+            n_with_vertices: 0,
+            part: 0,
+            sets: ElementSets::default(),
         }
     }
 
@@ -71,78 +91,66 @@ impl<'a, 'b> Elements<'a, 'b> {
         tags.iter().map(find).collect()
     }
 
-    /// Keeps a face until all nodes are known.
+    /// Keeps a face until all nodes and sets are known. `set` is empty or the name of a set that has it.
     pub(super) fn face(
         &mut self,
         id: i64,
         tags: &[i64],
         n_nodes: usize,
-        label: String,
+        set: &str,
         place: &FilePlace,
     ) {
         self.n_curved += u64::from(n_nodes > tags.len());
-        self.faces.push((id, tags.to_vec(), label, place.clone()));
+        let part = self.part;
+        let set = (!set.is_empty()).then(|| self.sets.exact(part, set));
+        self.faces.push(Face { part, id, corners: tags.to_vec(), set, place: place.clone() });
     }
 
-    /// Adds the faces and solid elements kept so far; `label_of` may replace the label of an element.
-    pub(super) fn take_faces(&mut self, label_of: impl Fn(i64) -> Option<String>) -> Result<()> {
-        for (id, tags, label, place) in std::mem::take(&mut self.faces) {
-            let corners = self.corners(&tags, &place)?;
-            let label = self.target.label(&label_of(id).unwrap_or(label));
-            let added = self.target.builder.polygon(&corners, label);
-            added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
+    /// Finds the vertices of the faces kept so far, and adds the solid elements.
+    pub(super) fn end_part(&mut self) -> Result<()> {
+        let mut faces = std::mem::take(&mut self.faces);
+        for face in &mut faces[self.n_with_vertices..] {
+            let vertices = self.corners(&face.corners, &face.place)?;
+            face.corners = vertices.into_iter().map(i64::from).collect();
         }
+        (self.n_with_vertices, self.faces) = (faces.len(), faces);
         for (tags, name, place) in std::mem::take(&mut self.late_solids) {
             self.solid(&tags, &name, &place)?;
         }
         Ok(())
     }
 
+    /// Adds the faces kept so far with the labels of their sets. Returns the number of sets with other elements than faces.
+    pub(super) fn take_faces(&mut self) -> Result<u64> {
+        self.end_part()?;
+        let faces = std::mem::take(&mut self.faces);
+        let elements: Vec<(u32, i64)> = faces.iter().map(|face| (face.part, face.id)).collect();
+        let (of, n_with_others) = self.sets.by_element(&elements);
+        let mut labels: HashMap<Vec<u32>, u32> = HashMap::new();
+        for face in faces {
+            let others = of.get(&(face.part, face.id)).into_iter().flatten();
+            let mut sets: Vec<u32> = face.set.into_iter().chain(others.copied()).collect();
+            self.sets.with_parents(&mut sets);
+            let label = match labels.get(&sets) {
+                Some(&label) => label,
+                None => {
+                    let names: Vec<&str> = sets.iter().map(|&set| self.sets.name(set)).collect();
+                    let label = self.target.label_of_all(&names);
+                    labels.insert(sets, label);
+                    label
+                }
+            };
+            let corners: Vec<u32> = face.corners.iter().map(|&v| v as u32).collect();
+            let added = self.target.builder.polygon(&corners, label);
+            added.map_err(|source| face.place.refuse(ReadFault::Surface(source)))?;
+        }
+        Ok(n_with_others)
+    }
+
     pub(super) fn solid(&mut self, tags: &[i64], name: &str, place: &FilePlace) -> Result<()> {
         let corners = self.corners(tags, place)?;
         let added = self.solids.add(&corners, name, self.target);
         added.map_err(|source| place.refuse(ReadFault::Surface(source)))
-    }
-
-    /// An element of Abaqus: its number and its nodes.
-    pub(super) fn abaqus_element(
-        &mut self,
-        text: &str,
-        kind: &str,
-        set: &str,
-        place: &FilePlace,
-    ) -> Result<()> {
-        let words = text.split(',').filter(|w| !w.trim().is_empty());
-        let tags = words.map(|w| integer(w, place)).collect::<Result<Vec<i64>>>()?;
-        let (id, tags) = tags.split_first().ok_or_else(|| unexpected(place, "an element", text))?;
-        let is = |prefixes: &[&str]| prefixes.iter().any(|p| kind.starts_with(p));
-        let n = tags.len();
-        // Continuum shells are solid elements.
-        if is(&["C3D", "DC3D", "AC3D", "SC6R", "SC8R"]) {
-            let corners = match n {
-                4 | 10 => 4,
-                5 | 13 => 5,
-                6 | 15 => 6,
-                8 | 20 | 27 => 8,
-                _ => return Err(unexpected(place, "a solid element of that type", kind)),
-            };
-            self.late_solids.push((tags[..corners].to_vec(), set.to_owned(), place.clone()));
-        } else if is(&[
-            "T2D", "T3D", "B2", "B3", "PIPE", "CONN", "SPRING", "MASS", "ROTARY", "DASH", "GAP",
-            "R2D", "RB",
-        ]) {
-            self.n_thin += 1;
-        } else if is(&["S", "DS", "R3D", "M3D", "CPS", "CPE", "CAX", "F3D"]) {
-            let corners = match n {
-                3 | 6 | 7 => 3,
-                4 | 8 | 9 => 4,
-                _ => return Err(unexpected(place, "3, 4, 6, 8 or 9 nodes", text)),
-            };
-            self.face(*id, &tags[..corners], n, set.to_owned(), place);
-        } else {
-            return Err(unsupported(place, format!("the element type {}", quote(kind.as_bytes()))));
-        }
-        Ok(())
     }
 
     pub(super) fn finish<R: BufRead>(self, feed: &Feed<R>) -> Result<()> {
@@ -194,87 +202,6 @@ pub(super) fn line<R: BufRead>(
     }
 }
 
-/// Reads an input deck of Abaqus: `*NODE` and `*ELEMENT`; the element set of a block is its label.
-pub(super) fn read_abaqus<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
-    let mut mesh = Elements::new(target);
-    let (mut keyword, mut kind, mut set) = (String::new(), String::new(), String::new());
-    let (mut n_parts, mut n_instances, mut n_sets) = (0, 0, 0);
-    while let Some((mut text, place)) = line(&mut feed, "**")? {
-        if text.trim_start().starts_with('*') {
-            while text.ends_with(',') {
-                let Some((more, _)) = line(&mut feed, "**")? else {
-                    return Err(feed.truncated("the rest of the keyword"));
-                };
-                text += &more;
-            }
-            let mut words = text.trim_start().split(',').map(str::trim);
-            keyword = words.next().unwrap_or_default().to_ascii_uppercase();
-            let options: Vec<(String, &str)> = words
-                .filter_map(|w| w.split_once('='))
-                .map(|(key, value)| (key.trim().to_ascii_uppercase(), value.trim()))
-                .collect();
-            let option = |key: &str| options.iter().find(|o| o.0 == key).map(|o| o.1.to_owned());
-            match keyword.as_str() {
-                "*NODE" | "*ELEMENT" if option("INPUT").is_some() => {
-                    return Err(unsupported(&place, "data in a file of its own (INPUT)"));
-                }
-                "*ELEMENT" => {
-                    kind = option("TYPE").unwrap_or_default().to_ascii_uppercase();
-                    set = option("ELSET").unwrap_or_default();
-                }
-                "*PART" => {
-                    mesh.take_faces(|_| None)?;
-                    n_parts += 1;
-                    mesh.nodes = NodeTags::default();
-                    mesh.first = mesh.target.builder.n_file_vertices() as u32;
-                }
-                "*INSTANCE" => n_instances += 1,
-                "*ELSET" => n_sets += 1,
-                "*INCLUDE" | "*SYSTEM" | "*NGEN" | "*NFILL" | "*ELGEN" | "*NCOPY" | "*NMAP"
-                | "*ELCOPY" => {
-                    return Err(unsupported(&place, format!("the keyword {keyword}")));
-                }
-                "*NODE" if option("SYSTEM").is_some_and(|s| !s.eq_ignore_ascii_case("R")) => {
-                    return Err(unsupported(&place, "nodes in a coordinate system of their own"));
-                }
-                _ => {}
-            }
-            if n_instances > n_parts.max(1) {
-                return Err(unsupported(&place, "a part with several instances"));
-            }
-            continue;
-        }
-        match keyword.as_str() {
-            "*INSTANCE" => return Err(unsupported(&place, "an instance that is moved")),
-            "*NODE" => {
-                let words: Vec<&str> = text.split(',').collect();
-                let mut xyz = [0.0; 3];
-                for (k, x) in xyz.iter_mut().enumerate() {
-                    let word = words.get(k + 1).map(|w| w.trim()).filter(|w| !w.is_empty());
-                    *x = word.map_or(Ok(0.0), |w| real(w, &place))?;
-                }
-                mesh.node(integer(words[0], &place)?, xyz, &place)?;
-            }
-            "*ELEMENT" => {
-                while text.ends_with(',') {
-                    let Some((more, _)) = line(&mut feed, "**")? else {
-                        return Err(feed.truncated("more nodes of the element"));
-                    };
-                    text += &more;
-                }
-                mesh.abaqus_element(&text, &kind, &set, &place)?;
-            }
-            _ => {}
-        }
-    }
-    mesh.take_faces(|_| None)?;
-    if n_sets > 0 {
-        let what = "element sets of their own (those of *ELEMENT are labels)";
-        mesh.target.builder.note(NoteKind::SkippedElements { what, n: n_sets });
-    }
-    mesh.finish(&feed)
-}
-
 /// The fields of a bulk data card: between commas, or 8 or 16 characters wide.
 fn fields(text: &str) -> Vec<String> {
     if text.contains(',') {
@@ -324,11 +251,13 @@ fn continues(text: &str) -> bool {
 /// Reads bulk data of Nastran: `GRID` and shells, in every field format; the property of an element is its label.
 pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut mesh = Elements::new(target);
+    let mut n_sets = 0;
     let mut next = nastran_line(&mut feed)?;
     while let Some((text, place)) = next {
         next = nastran_line(&mut feed)?;
         let mut card = fields(&text);
         let kind = card[0].trim_end_matches('*').to_ascii_uppercase();
+        n_sets += u64::from(kind.starts_with("SET ") && text.contains('='));
         if kind == "ENDDATA" {
             break;
         }
@@ -364,6 +293,10 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
             kind if kind.starts_with("CTRI") || kind.starts_with("CQUAD") => {
                 return Err(unsupported(&place, format!("the element {kind}")));
             }
+            "SET1" | "SET3" => {
+                n_sets += 1;
+                0
+            }
             "CTETRA" => -4,
             "CPENTA" => -6,
             "CPYRAM" => -5,
@@ -383,11 +316,15 @@ pub(super) fn read_nastran<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSi
             let id = integer(field(1), &place)?;
             let n_nodes =
                 if ["CTRIA6", "CQUAD8"].contains(&card[0].as_str()) { 8 } else { tags.len() };
-            mesh.face(id, &tags, n_nodes, property, &place);
+            mesh.face(id, &tags, n_nodes, &property, &place);
         } else if n_corners < 0 {
             mesh.late_solids.push((tags, format!("property_{property}"), place));
         }
     }
-    mesh.take_faces(|_| None)?;
+    mesh.take_faces()?;
+    if n_sets > 0 {
+        let what = "sets (SET, SET1, SET3), which have no names";
+        mesh.target.builder.note(NoteKind::SkippedElements { what, n: n_sets });
+    }
     mesh.finish(&feed)
 }

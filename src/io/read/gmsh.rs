@@ -1,7 +1,7 @@
 //! Gmsh `.msh` of versions 1, 2, 4.0 and 4.1, text and binary: triangles and quadrilaterals, physical groups as labels.
 //!
-//! Sections this reader does not need are passed over. An element in several physical groups is given to the first, with a note;
-//! version 2 repeats such elements, one behind the other. Curved faces are taken by their corners.
+//! Sections this reader does not need are passed over. A face in several physical groups has the labels of all, a volume the name of the
+//! first, with a note; versions 1 and 2 repeat such elements. Curved faces are taken by their corners.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::io::BufRead;
@@ -21,15 +21,15 @@ pub(super) struct GmshReader<'a, 'b, R> {
     pub(super) nodes: NodeTags,
     /// Names of the surface groups.
     pub(super) names: HashMap<i64, String>,
-    /// Surface entity -> its first physical group (4.1).
-    pub(super) groups: HashMap<i64, i64>,
+    /// Surface entity -> its physical groups (4).
+    pub(super) groups: HashMap<i64, Vec<i64>>,
     /// Surface entities inside a volume, where two partitions meet (4.1).
     pub(super) inside: HashSet<i64>,
-    /// The label used last and the group it came from.
-    pub(super) last: Option<(i64, u32)>,
-    /// Corners and group of the last element.
-    pub(super) last_element: Option<(ElementType, [i64; 8], i64)>,
-    /// Surface groups with elements that another group has too.
+    /// The label used last and the groups it came from.
+    pub(super) last: Option<(Vec<i64>, u32)>,
+    /// Corners and group of the last solid element.
+    pub(super) last_solid: Option<(ElementType, [i64; 8], i64)>,
+    /// Volume groups with elements that another group has too.
     pub(super) other_groups: BTreeSet<i64>,
     /// Numbers at nodes by their tags, where they are wanted.
     pub(super) node_data: Option<HashMap<i64, f64>>,
@@ -38,7 +38,7 @@ pub(super) struct GmshReader<'a, 'b, R> {
     pub(super) n_thin: u64,
     /// Names and groups of volumes, as of surfaces.
     pub(super) volume_names: HashMap<i64, String>,
-    pub(super) volume_groups: HashMap<i64, i64>,
+    pub(super) volume_groups: HashMap<i64, Vec<i64>>,
 }
 
 /// A version of the format.
@@ -68,7 +68,7 @@ impl<'a, 'b, R: BufRead> GmshReader<'a, 'b, R> {
             groups: HashMap::new(),
             inside: HashSet::new(),
             last: None,
-            last_element: None,
+            last_solid: None,
             other_groups: BTreeSet::new(),
             node_data: None,
             solids: Solids::default(),
@@ -82,12 +82,15 @@ impl<'a, 'b, R: BufRead> GmshReader<'a, 'b, R> {
 
 pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut mesh = GmshReader::open(feed, target)?;
+    if matches!(mesh.version, Version::V1 | Version::V2) {
+        mesh.target.builder.join_groups_at_end();
+    }
     mesh.read_sections()?;
     if mesh.n_curved > 0 {
         mesh.target.builder.note(NoteKind::CurvedFaces { n: mesh.n_curved });
     }
     if !mesh.other_groups.is_empty() {
-        let names: Vec<String> = mesh.other_groups.iter().map(|&g| mesh.group_name(g)).collect();
+        let names: Vec<String> = mesh.other_groups.iter().map(|&g| mesh.volume_name(g)).collect();
         mesh.target.builder.note(NoteKind::OtherGroups { names: names.join(", ") });
     }
     mesh.target.leave_out_cells(mesh.solids.len());
@@ -243,22 +246,30 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         self.numbers.end("$EndPhysicalNames")
     }
 
-    fn group_name(&self, group: i64) -> String {
-        self.names.get(&group).cloned().unwrap_or_else(|| group.to_string())
+    /// The name of a physical group of volumes; 0 is none.
+    fn volume_name(&self, group: i64) -> String {
+        match (group, self.volume_names.get(&group)) {
+            (0, _) => String::new(),
+            (_, Some(name)) => name.clone(),
+            _ => format!("volume_{group}"),
+        }
     }
 
-    /// The label of a physical group; 0 is none.
-    fn label(&mut self, group: i64) -> u32 {
-        if let Some((known, label)) = self.last
-            && known == group
+    /// The label of faces in these physical groups; 0 is none.
+    fn label(&mut self, groups: &[i64]) -> u32 {
+        if let Some((known, label)) = &self.last
+            && known == groups
         {
-            return label;
+            return *label;
         }
-        let label = match group {
-            0 => self.target.label(""),
-            _ => self.target.label(&self.group_name(group)),
+        let name = |group: &i64| match (group, self.names.get(group)) {
+            (0, _) => String::new(),
+            (_, Some(name)) => name.clone(),
+            _ => group.to_string(),
         };
-        self.last = Some((group, label));
+        let names: Vec<String> = groups.iter().map(name).collect();
+        let label = self.target.label_of_all(&names);
+        self.last = Some((groups.to_vec(), label));
         label
     }
 
@@ -276,20 +287,17 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     }
 
     /// Takes the nodes of an element as a face or a solid; the first ones are its corners.
-    pub(super) fn element(&mut self, kind: ElementType, tags: &[i64; 8], group: i64) -> Result<()> {
+    pub(super) fn element(
+        &mut self,
+        kind: ElementType,
+        tags: &[i64; 8],
+        groups: &[i64],
+    ) -> Result<()> {
         let ElementType { n_nodes, n_corners, role } = kind;
         self.n_thin += u64::from(role == Role::Thin);
         if role == Role::Thin || role == Role::Face && self.target.leaves_out_face() {
             return Ok(());
         }
-        if let Some((last, of_last, known)) = &self.last_element
-            && (last.n_nodes, last.role, of_last) == (n_nodes, role, tags)
-            && *known != group
-        {
-            self.other_groups.insert(group);
-            return Ok(());
-        }
-        self.last_element = Some((kind, *tags, group));
         let mut corners = [0; 8];
         for (corner, tag) in corners.iter_mut().zip(&tags[..n_corners]) {
             *corner = self.nodes.find(*tag, &self.numbers.feed)?;
@@ -297,14 +305,19 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         let corners = &corners[..n_corners];
         if role == Role::Face {
             self.n_curved += u64::from(n_nodes > n_corners);
-            let label = self.label(group);
+            let label = self.label(groups);
             return self.numbers.feed.placed(self.target.builder.polygon(corners, label));
         }
-        let name = match (group, self.volume_names.get(&group)) {
-            (0, _) => String::new(),
-            (_, Some(name)) => name.clone(),
-            _ => format!("volume_{group}"),
-        };
+        let group = groups.first().copied().unwrap_or(0);
+        if let Some((last, of_last, known)) = &self.last_solid
+            && (last.n_nodes, of_last) == (n_nodes, tags)
+            && *known != group
+        {
+            self.other_groups.insert(group);
+            return Ok(());
+        }
+        self.last_solid = Some((kind, *tags, group));
+        let name = self.volume_name(group);
         if self.target.cells.are_wanted() {
             return self.target.cell(&self.numbers.feed, (corners, n_nodes), &name);
         }
@@ -334,16 +347,14 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 for _ in 0..if is_point { 3 } else { 6 } {
                     self.numbers.double()?;
                 }
-                let groups = self.int_list()?;
-                let known = match dimension {
-                    2 => &mut self.groups,
-                    _ => &mut self.volume_groups,
-                };
-                if let (2.., Some(&group)) = (dimension, groups.first()) {
-                    known.insert(entity, group.saturating_abs());
-                }
-                if dimension == 2 {
-                    self.other_groups.extend(groups.iter().skip(1).map(|g| g.saturating_abs()));
+                let groups = self.int_list()?.into_iter().map(i64::saturating_abs).collect();
+                match dimension {
+                    2 => drop(self.groups.insert(entity, groups)),
+                    3 => {
+                        self.other_groups.extend(groups.iter().skip(1));
+                        self.volume_groups.insert(entity, groups);
+                    }
+                    _ => {}
                 }
                 if dimension > 0 {
                     self.int_list()?;
@@ -446,7 +457,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 3 => Some(&self.volume_groups),
                 _ => None,
             };
-            let group = groups.and_then(|g| g.get(&entity)).copied().unwrap_or(0);
+            let groups = groups.and_then(|g| g.get(&entity)).cloned().unwrap_or_default();
             let is_inside = dimension == 2 && self.inside.contains(&entity);
             for k in 0..n {
                 self.numbers.need_record("elements", n, k)?;
@@ -459,7 +470,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                     }
                 }
                 if !(is_inside && kind.role == Role::Face) {
-                    self.element(kind, &tags, group)?;
+                    self.element(kind, &tags, &groups)?;
                 }
             }
             found += n;

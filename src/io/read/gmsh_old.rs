@@ -111,7 +111,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 *slot = tag;
             }
         }
-        self.element(kind, &tags, group)
+        self.element(kind, &tags, &[group])
     }
 
     /// Text in quotes, numbers and whole numbers, each with their count, then tags with numbers.

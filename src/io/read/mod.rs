@@ -1,4 +1,4 @@
-//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen, VTK, Abaqus, Nastran, I-DEAS; sizes at the vertices of
+//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen, VTK, Abaqus, Nastran, I-DEAS, 3MF, GIFTI; sizes at the vertices of
 //! meshes; files of edges and points.
 //!
 //! A declared count is compared with the length of the file before it is used; every error
@@ -6,12 +6,15 @@
 //! become doubles exactly. Polygons are cut into triangles, vertices with identical bits
 //! are one.
 
+mod abaqus;
 mod cells;
+mod element_sets;
 mod embedded;
 mod embedded_sink;
 mod error;
 mod feed;
 mod fem;
+mod gifti;
 mod gmsh;
 mod gmsh_numbers;
 mod gmsh_old;
@@ -28,6 +31,8 @@ mod sizes;
 mod solids;
 mod stl;
 mod tetgen;
+mod three_mf;
+mod three_mf_model;
 mod unv;
 mod volume_cells;
 mod vtk;
@@ -92,6 +97,10 @@ pub enum Format {
     Nastran,
     /// I-DEAS universal file, `.unv`.
     Unv,
+    /// 3MF, `.3mf`.
+    ThreeMf,
+    /// GIFTI, `.gii`.
+    Gifti,
 }
 
 impl Format {
@@ -115,6 +124,8 @@ impl Format {
             "nas" | "bdf" => Self::Nastran,
             "unv" => Self::Unv,
             "vtp" | "vtu" => Self::VtkXml,
+            "3mf" => Self::ThreeMf,
+            "gii" => Self::Gifti,
             _ => return None,
         })
     }
@@ -141,6 +152,8 @@ impl Format {
             Some(Self::Off)
         } else if starts("solid") || is_binary_stl(head, length) {
             Some(Self::Stl)
+        } else if starts("PK\x03\x04") {
+            Some(Self::ThreeMf)
         } else if starts("v ") {
             Some(Self::Obj)
         } else {
@@ -234,7 +247,7 @@ pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> 
 }
 
 const UNKNOWN_FORMAT: ReadFault = ReadFault::UnknownFormat(
-    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh, .poly, .ele, .vtk, .vtp, .vtu, .inp, .nas, .bdf or .unv after what it holds, with .gz or .zst behind it where it is packed",
+    "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh, .poly, .ele, .vtk, .vtp, .vtu, .inp, .nas, .bdf, .unv, .3mf or .gii after what it holds, with .gz or .zst behind it where it is packed",
 );
 
 fn unique(stem: &str, taken: &[String]) -> String {
@@ -293,10 +306,12 @@ fn read_feed<R: BufRead>(
         Format::TetgenEle => cells::read_ele(feed, nodes, limit, target),
         Format::TetgenSmesh => tetgen::read(feed, tetgen::FacetLayout::Smesh, nodes, limit, target),
         Format::Vtk => vtk::read_surface(feed, target),
-        Format::Abaqus => fem::read_abaqus(feed, target),
+        Format::Abaqus => abaqus::read_abaqus(feed, target),
         Format::Nastran => fem::read_nastran(feed, target),
         Format::Unv => unv::read_unv(feed, target),
         Format::VtkXml => vtk_xml::read(feed, limit, target),
+        Format::ThreeMf => three_mf::read(feed, limit, target),
+        Format::Gifti => gifti::read(feed, limit, target),
         Format::TetgenPoly => tetgen::read(feed, tetgen::FacetLayout::Poly, nodes, limit, target),
     }
 }

@@ -9,7 +9,7 @@ use std::io::BufRead;
 use super::embedded_sink::{EmbeddedSink, WireKind};
 use super::feed::{Feed, not_a_number, parse, quote};
 use super::{FilePlace, ReadError, ReadFault, Result, Spot, SurfaceSink};
-use tetdb_base::geom::Point;
+use tetdb_base::geom::{Point, counted};
 use tetdb_base::surface::NoteKind;
 
 /// Names in force; the first of group, object and material that is not empty is the label of a face.
@@ -80,9 +80,36 @@ const IGNORED: [&[u8]; 16] = [
     b"end",
 ];
 
+/// Labels that comments of tetdb declare.
+#[derive(Default)]
+struct Declared {
+    labels: Vec<u32>,
+    /// Names of labels for several.
+    sets: HashMap<String, u32>,
+}
+
+impl Declared {
+    /// Takes a comment that declares a label, or one for the labels of these positions.
+    fn take(&mut self, line: &[u8], target: &mut SurfaceSink) {
+        let text = super::feed::name(line);
+        if let Some(text) = text.strip_prefix("# tetdb labels ") {
+            let (numbers, name) = text.split_once(" = ").unwrap_or_default();
+            let label = |n: &str| self.labels.get(n.parse::<usize>().ok()?).copied();
+            let members: Vec<u32> = numbers.split(' ').filter_map(label).collect();
+            if !members.is_empty() {
+                let label = target.builder.label_of_all(&members);
+                self.sets.insert(name.to_owned(), label);
+                self.labels.push(label);
+            }
+        } else if let Some(name) = text.strip_prefix("# tetdb label ") {
+            self.labels.push(target.label(name));
+        }
+    }
+}
+
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut names = Names::default();
-    let mut label = None;
+    let (mut label, mut declared) = (None, Declared::default());
     let mut line = Vec::new();
     let mut corners = Vec::new();
     // Vertex numbers beyond those known when they were named, each larger than the one before.
@@ -116,12 +143,14 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                 }
                 let label = *label.get_or_insert_with(|| {
                     merged.check(&names);
-                    target.label(names.best())
+                    let known = declared.sets.get(names.best()).copied();
+                    known.unwrap_or_else(|| target.label(names.best()))
                 });
                 let added = target.builder.polygon(&corners, label);
                 added.map_err(|source| place.refuse(ReadFault::Surface(source)))?;
             }
             b"l" | b"p" => n_lines_points += 1,
+            b"" if line.starts_with(b"# tetdb label") => declared.take(&line, target),
             word if names.take(word, &line) => label = None,
             b"curv" | b"curv2" | b"surf" => {
                 let what = "a free-form curve or surface".to_owned();
@@ -141,8 +170,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         target.builder.note(NoteKind::Said(what));
     }
     if let Some((word, Spot::Line(line))) = unknown {
-        let left_out = "lines of no known kind were left out, the first one";
-        let what = format!("{n_unknown} {left_out} {word} in line {line}");
+        let left_out = "[line|lines] of no known kind [was|were] left out, the first one";
+        let what = format!("{} {word} in line {line}", counted(n_unknown, left_out));
         target.builder.note(NoteKind::Said(what));
     }
     let known = target.builder.n_file_vertices() as u32;

@@ -4,8 +4,11 @@ use std::io::BufRead;
 
 use super::feed::{Feed, parse, quote};
 use super::{Result, Spot, SurfaceSink};
-use tetdb_base::geom::Point;
+use tetdb_base::geom::{Point, counted};
 use tetdb_base::surface::NoteKind;
+
+/// Whole numbers of faces that name no region.
+const COLORS: [&str; 5] = ["red", "green", "blue", "alpha", "flags"];
 
 #[derive(Clone, Copy, PartialEq)]
 enum Encoding {
@@ -40,6 +43,10 @@ impl Scalar {
             "double" | "float64" => Self::F64,
             _ => return None,
         })
+    }
+
+    fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
     }
 
     fn bytes(self) -> u64 {
@@ -108,7 +115,9 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
 
 /// Notes elements that are neither vertices nor faces.
 fn note_skipped(element: &str, n: u64, target: &mut SurfaceSink) {
-    let what = format!("{n} records of the element {} were left out", quote(element.as_bytes()));
+    let name = quote(element.as_bytes());
+    let records = counted(n, "[record|records] of the element");
+    let what = format!("{records} {name} {} left out", if n == 1 { "was" } else { "were" });
     match (n, element) {
         (0, _) => {}
         (_, "edge") => target.builder.note(NoteKind::SkippedElements { what: "edges", n }),
@@ -289,6 +298,16 @@ impl<R: BufRead> PlyReader<R> {
         };
         if n > 0 && element.properties.iter().filter(|p| is_corners(p)).count() != 1 {
             return Err(self.feed.unexpected("a face property `vertex_indices`", b"none"));
+        }
+        let is_number = |p: &&Property| p.count.is_none() && p.value.is_integer();
+        let own = element.properties.iter().filter(is_number).map(|p| p.name.as_str());
+        let own: Vec<&str> = own.filter(|name| !COLORS.contains(name)).collect();
+        if n > 0 && !own.is_empty() {
+            let what = format!(
+                "properties of faces that may name regions were left out: {}",
+                own.join(", ")
+            );
+            target.builder.note(NoteKind::Said(what));
         }
         let n_vertices = u64::try_from(n_vertices).unwrap_or(0);
         let label = target.label("");

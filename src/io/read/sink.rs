@@ -27,6 +27,18 @@ impl SurfaceSink<'_> {
         }
     }
 
+    /// The label of triangles in all groups of these names, or the file's own label without names.
+    pub(super) fn label_of_all<T: AsRef<str>>(&mut self, names: &[T]) -> u32 {
+        match names {
+            [] => self.label(""),
+            [name] => self.label(name.as_ref()),
+            names => {
+                let labels: Vec<u32> = names.iter().map(|name| self.label(name.as_ref())).collect();
+                self.builder.label_of_all(&labels)
+            }
+        }
+    }
+
     /// Names the region around `point`; returns the name with its prefix.
     pub(super) fn region(&mut self, point: Point, name: &str) -> String {
         let name = match &self.prefix {

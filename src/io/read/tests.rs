@@ -2,9 +2,11 @@
 
 mod fem;
 mod gmsh;
+mod groups;
 mod indexed;
 mod losses;
 mod medit;
+mod packed_xml;
 mod ply;
 mod stl;
 mod tetgen;

@@ -59,8 +59,12 @@ pub(super) fn read<R: BufRead>(
             }
             FacetLayout::Poly => {
                 let facet = read_facet(&mut feed, numbering)?;
-                n_edges +=
-                    facet.polygons.iter().filter(|polygon| polygon.len() == 2).count() as u64;
+                for polygon in &facet.polygons {
+                    if let [a, b] = polygon[..] {
+                        target.builder.edge([a, b]);
+                        n_edges += 1;
+                    }
+                }
                 n_cut += u64::from(add_facet(&place, &facet, target)?);
             }
         }

@@ -1,6 +1,6 @@
 //! Universal files of I-DEAS, `.unv`: faces and nodes.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 use std::io::BufRead;
 
 use super::feed::{Feed, Result, name};
@@ -11,7 +11,7 @@ use tetdb_base::surface::NoteKind;
 /// Reads a universal file of I-DEAS: nodes (2411, 781), elements (2412) and groups of elements, which are labels.
 pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut mesh = Elements::new(target);
-    let mut groups = ElementGroups::default();
+    let mut n_others = 0;
     let mut solids = Vec::new();
     while let Some((mark, place)) = line(&mut feed, "\0")? {
         if mark.trim() != "-1" {
@@ -47,7 +47,7 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
                 unv_elements(&mut mesh, rows, &mut solids)?;
             }
             "2467" | "2477" | "2452" | "2435" | "2432" | "2430" | "2429" => {
-                groups.read(kind.trim(), rows)?;
+                n_others += read_groups(&mut mesh, kind.trim(), rows)?;
             }
             kind @ ("15" | "71" | "780" | "2417") => {
                 return Err(unsupported(&place, format!("the old data set {kind}")));
@@ -58,51 +58,58 @@ pub(super) fn read_unv<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) 
             _ => {}
         }
     }
-    mesh.take_faces(|id| groups.names.get(&id).cloned())?;
-    if !groups.others.is_empty() {
-        let names = Vec::from_iter(groups.others).join(", ");
+    mesh.take_faces()?;
+    let elements: Vec<(u32, i64)> = solids.iter().map(|(id, ..)| (0, *id)).collect();
+    let (groups, _) = mesh.sets.by_element(&elements);
+    let mut others = BTreeSet::new();
+    for (id, tags, place) in solids {
+        let sets = groups.get(&(0, id)).map_or(&[][..], Vec::as_slice);
+        let mut names = sets.iter().map(|&set| mesh.sets.name(set).to_owned());
+        let name = names.next().unwrap_or_default();
+        others.extend(names);
+        mesh.solid(&tags, &name, &place)?;
+    }
+    if !others.is_empty() {
+        let names = Vec::from_iter(others).join(", ");
         mesh.target.builder.note(NoteKind::OtherGroups { names });
     }
-    for (id, tags, place) in solids {
-        mesh.solid(&tags, groups.names.get(&id).map_or("", String::as_str), &place)?;
+    if n_others > 0 {
+        let what = "entries of groups that are no elements, such as nodes,";
+        mesh.target.builder.note(NoteKind::SkippedElements { what, n: n_others });
     }
     mesh.finish(&feed)
 }
 
-/// ElementGroups of elements.
-#[derive(Default)]
-struct ElementGroups {
-    /// By element, the first group that has it.
-    names: HashMap<i64, String>,
-    /// ElementGroups with elements of another group before.
-    others: BTreeSet<String>,
-}
-
-impl ElementGroups {
-    /// Reads a data set of groups: kind and number of an entity, and in later kinds of data sets two more words.
-    fn read(&mut self, kind: &str, mut rows: impl Iterator<Item = DeckLine>) -> Result<()> {
-        let each = if ["2432", "2430", "2429"].contains(&kind) { 2 } else { 4 };
-        while let (Some((head, place)), Some((title, _))) = (rows.next(), rows.next()) {
-            let n = numbers(&head, &place)?.last().copied().unwrap_or(0);
-            let mut words = Vec::new();
-            while (words.len() as i64) < n.saturating_mul(each) {
-                let Some((row, place)) = rows.next() else {
-                    let expected = format!("{n} entities of the group");
-                    return Err(unexpected(&place, &expected, "the end of the data set"));
-                };
-                words.extend(numbers(&row, &place)?);
-            }
-            let title = name(title.as_bytes());
+/// Reads a data set of groups: kind and number of an entity, and in later kinds of data sets two more words. Returns the number of
+/// entries that are no elements.
+fn read_groups(
+    mesh: &mut Elements,
+    kind: &str,
+    mut rows: impl Iterator<Item = DeckLine>,
+) -> Result<u64> {
+    let each = if ["2432", "2430", "2429"].contains(&kind) { 2 } else { 4 };
+    let mut n_others = 0;
+    while let (Some((head, place)), Some((title, _))) = (rows.next(), rows.next()) {
+        let n = numbers(&head, &place)?.last().copied().unwrap_or(0);
+        let mut words = Vec::new();
+        while (words.len() as i64) < n.saturating_mul(each) {
+            let Some((row, place)) = rows.next() else {
+                let expected = format!("{n} entities of the group");
+                return Err(unexpected(&place, &expected, "the end of the data set"));
+            };
+            words.extend(numbers(&row, &place)?);
+        }
+        let set = mesh.sets.exact(0, &name(title.as_bytes()));
+        for entry in words.chunks_exact(each as usize) {
             // Kind 8 is an element.
-            for entry in words.chunks_exact(each as usize).filter(|entry| entry[0] == 8) {
-                let first = self.names.entry(entry[1]).or_insert_with(|| title.clone());
-                if *first != title {
-                    self.others.insert(title.clone());
-                }
+            match entry[0] {
+                8 => mesh.sets.add(set, 0, [entry[1], entry[1], 1]),
+                0 => {}
+                _ => n_others += 1,
             }
         }
-        Ok(())
     }
+    Ok(n_others)
 }
 
 /// Returns whether the matrix of a coordinate system is that of the global axes, which leaves nodes in place.
@@ -153,10 +160,10 @@ fn unv_elements(
         let corners = |step: usize| tags.iter().copied().step_by(step).collect::<Vec<i64>>();
         match (kind, tags.len()) {
             (41 | 51 | 61 | 71 | 74 | 81 | 91, 3) | (44 | 54 | 64 | 84 | 94, 4) => {
-                mesh.face(id, &tags, tags.len(), String::new(), &place);
+                mesh.face(id, &tags, tags.len(), "", &place);
             }
             (42 | 52 | 62 | 72 | 82 | 92, 6) | (45 | 55 | 65 | 75 | 85 | 95, 8) => {
-                mesh.face(id, &corners(2), tags.len(), String::new(), &place);
+                mesh.face(id, &corners(2), tags.len(), "", &place);
             }
             (111, 4) | (112, 6) | (115, 8) => solids.push((id, tags, place)),
             (118, 10) => solids.push((id, vec![tags[0], tags[2], tags[4], tags[9]], place)),

@@ -6,7 +6,7 @@ use std::io::{BufRead, Read};
 
 use super::feed::{Feed, check_point, quote};
 use super::vtk::{CELL_VALUES, CellCounts, Shape, shape};
-use super::xml::Tag;
+use super::xml::{Tag, base64_word, line_of, numbers};
 use super::{FilePlace, ReadFault, Result, Spot, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
@@ -93,27 +93,8 @@ impl Bytes<'_> {
             }
             Self::Base64 { text, ready } => {
                 while ready.len() < n {
-                    let (mut word, mut n_bits) = (0u32, 0);
-                    let mut left = 4;
-                    while left > 0 {
-                        let (&letter, rest) = text.split_first()?;
-                        *text = rest;
-                        let bits = match letter {
-                            b'A'..=b'Z' => letter - b'A',
-                            b'a'..=b'z' => letter - b'a' + 26,
-                            b'0'..=b'9' => letter - b'0' + 52,
-                            b'+' => 62,
-                            b'/' => 63,
-                            b'=' => {
-                                (word, left) = (word << 6, left - 1);
-                                continue;
-                            }
-                            _ if letter.is_ascii_whitespace() => continue,
-                            _ => return None,
-                        };
-                        (word, n_bits, left) = (word << 6 | u32::from(bits), n_bits + 6, left - 1);
-                    }
-                    ready.extend(&word.to_be_bytes()[1..1 + n_bits / 8]);
+                    let (bytes, k) = base64_word(text)?;
+                    ready.extend(&bytes[..k]);
                 }
                 Some(ready.drain(..n).collect())
             }
@@ -180,38 +161,7 @@ impl Layout<'_> {
             _ => return None,
         };
         let content = self.content(&mut bytes)?;
-        self.numbers(tag.get("type").unwrap_or_default(), &content)
-    }
-
-    fn numbers(&self, kind: &str, content: &[u8]) -> Option<Vec<f64>> {
-        macro_rules! numbers {
-            ($type:ty) => {
-                (content.chunks_exact(size_of::<$type>()))
-                    .map(|b| {
-                        let bytes = b.try_into().unwrap_or_default();
-                        let x = if self.is_big {
-                            <$type>::from_be_bytes(bytes)
-                        } else {
-                            <$type>::from_le_bytes(bytes)
-                        };
-                        x as f64
-                    })
-                    .collect()
-            };
-        }
-        Some(match kind {
-            "Int8" => numbers!(i8),
-            "UInt8" => numbers!(u8),
-            "Int16" => numbers!(i16),
-            "UInt16" => numbers!(u16),
-            "Int32" => numbers!(i32),
-            "UInt32" => numbers!(u32),
-            "Int64" => numbers!(i64),
-            "UInt64" => numbers!(u64),
-            "Float32" => numbers!(f32),
-            "Float64" => numbers!(f64),
-            _ => return None,
-        })
+        numbers(tag.get("type").unwrap_or_default(), self.is_big, &content)
     }
 }
 
@@ -219,12 +169,7 @@ impl Layout<'_> {
 pub(super) fn pieces<R: BufRead>(mut feed: Feed<R>, limit: u64) -> Result<Vec<Piece>> {
     let text = feed.rest(limit)?;
     let whole = FilePlace { file: feed.file().to_owned(), spot: Spot::File };
-    let place_of = |byte: usize| FilePlace {
-        file: whole.file.clone(),
-        spot: Spot::Line(
-            1 + text[..byte.min(text.len())].iter().filter(|&&b| b == b'\n').count() as u64,
-        ),
-    };
+    let place_of = |byte| FilePlace { file: whole.file.clone(), spot: line_of(&text, byte) };
     let unsupported =
         |byte: usize, what: String| place_of(byte).refuse(ReadFault::Unsupported(what));
     let expected = |byte: usize, what: &str| {

@@ -1,4 +1,5 @@
-//! Abaqus input: C3D4 elements, or C3D10 with the midpoints of edges, an element set per region, a surface and a node set per label.
+//! Abaqus input: C3D4 elements, or C3D10 with the midpoints of edges, an element set per region, a surface and a node set per label; faces
+//! of several groups are in those of each.
 //!
 //! Source: the Abaqus keywords reference; faces of C3D4 are S1 = 1 2 3, S2 = 1 4 2, S3 = 2 4 3, S4 = 3 4 1.
 
@@ -68,7 +69,7 @@ pub(super) fn write(
     let regions = regions.iter().map(|&r| (r, mesh.region_name(r)));
     let regions = set_names(&regions.collect());
     let sides = elements(mesh, &dir, &mut stream, &regions, midpoints)?;
-    let names = set_names(&mesh.labels());
+    let names = set_names(&mesh.groups());
     surfaces(sides, &names, &mut stream)?;
     node_sets(mesh, &dir, &names, &mut stream, midpoints)?;
     embedded(mesh, &mut stream);
@@ -94,6 +95,7 @@ fn elements(
     let mut by_region = Sorter::new(dir, mesh.sorter_bytes() / 2);
     let mut sides = Sorter::new(dir, mesh.sorter_bytes() / 2);
     let mut faces = faces_by_tet(mesh, dir)?;
+    let groups = groups(mesh);
     let mut number = 0u64;
     let first_midpoint = mesh.n_vertices() + 1;
     let mut edges = midpoints.map(Midpoints::tets).transpose()?;
@@ -101,11 +103,10 @@ fn elements(
         while let Some(face) = faces.next_below(number as u32 + 1)? {
             let outside = |v: &u64| !face.vertices.contains(&(*v as u32));
             let opposite = tet.nodes.iter().position(outside).unwrap_or(0);
-            sides.push(ElementSide {
-                label: face.mark,
-                element: number + 1,
-                side: SIDE_OPPOSITE[opposite],
-            })?;
+            let (element, side) = (number + 1, SIDE_OPPOSITE[opposite]);
+            for &label in &groups[&face.mark] {
+                sides.push(ElementSide { label, element, side })?;
+            }
         }
         number += 1;
         if regions.len() > 1 {
@@ -122,6 +123,11 @@ fn elements(
     let head = |region: u32| format!("*ELSET, ELSET={}\n", regions[&region]);
     sets(by_region.finish()?, head, stream)?;
     Ok(sides.finish()?)
+}
+
+/// The groups of each label that faces have.
+fn groups(mesh: &Merged) -> BTreeMap<u32, Vec<u32>> {
+    mesh.labels().into_keys().map(|label| (label, mesh.label_members(label))).collect()
 }
 
 /// Embedded edges as sets of T3D2 elements, points as sets of nodes.
@@ -214,17 +220,16 @@ fn node_sets(
     stream: &mut Stream,
     midpoints: Option<&Midpoints>,
 ) -> Result<()> {
+    let groups = groups(mesh);
     let mut sorter = Sorter::new(dir, mesh.sorter_bytes());
     let mut edges = midpoints.map(Midpoints::faces).transpose()?;
     mesh.faces().each(|face| {
-        for v in face.vertices {
-            let (set, number) = (face.label, v + 1);
-            sorter.push(Member { set, number })?;
-        }
-        if let Some(edges) = &mut edges {
-            for edge in edges.next()? {
-                let (set, number) = (face.label, mesh.n_vertices() + edge + 1);
-                sorter.push(Member { set, number })?;
+        let edges = edges.as_mut().map(|edges| edges.next()).transpose()?;
+        let midpoints = edges.into_iter().flatten().map(|edge| mesh.n_vertices() + edge);
+        let nodes: Vec<u64> = face.vertices.into_iter().chain(midpoints).collect();
+        for &set in &groups[&face.label] {
+            for node in &nodes {
+                sorter.push(Member { set, number: node + 1 })?;
             }
         }
         Ok(())

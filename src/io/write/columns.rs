@@ -2,6 +2,8 @@
 //!
 //! VTK files and NumPy arrays are written from lists of columns, so that each array is described in one place.
 
+use std::borrow::Cow;
+
 use super::error::Result;
 use super::stream::Strip;
 
@@ -79,7 +81,7 @@ impl<T: ColumnValue, const N: usize> ColumnValue for [T; N] {
 
 /// A column of rows of type `T`.
 pub(super) struct TableColumn<T> {
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     pub number: Number,
     /// Numbers in a row.
     pub components: u64,
@@ -90,11 +92,11 @@ type Put<T> = dyn Fn(&T, &mut Strip) -> Result<()>;
 
 /// The column `name` with the `value` of each row.
 pub(super) fn column<T, V: ColumnValue>(
-    name: &'static str,
+    name: impl Into<Cow<'static, str>>,
     value: impl Fn(&T) -> V + 'static,
 ) -> TableColumn<T> {
     TableColumn {
-        name,
+        name: name.into(),
         number: V::NUMBER,
         components: V::COMPONENTS,
         put: Box::new(move |row, strip| value(row).put(strip)),

@@ -4,6 +4,8 @@
 //! out before its first byte is written.
 //! Source: the HDF5 file format specification, version 3.0 (superblock 2, object headers 2); the checksum is Jenkins's `lookup3`.
 
+use std::borrow::Cow;
+
 use super::columns::Number;
 
 impl Number {
@@ -32,7 +34,7 @@ impl Number {
 
 /// A node of the file's tree.
 pub(super) struct Hdf5Object {
-    name: &'static str,
+    name: Cow<'static, str>,
     attributes: Vec<Hdf5Attribute>,
     content: Content,
 }
@@ -51,15 +53,15 @@ enum Content {
 }
 
 impl Hdf5Object {
-    pub fn group(name: &'static str, children: Vec<Hdf5Object>) -> Self {
+    pub fn group(name: impl Into<Cow<'static, str>>, children: Vec<Hdf5Object>) -> Self {
         let (attributes, content) = (Vec::new(), Content::Group(children));
-        Self { name, attributes, content }
+        Self { name: name.into(), attributes, content }
     }
 
     /// An array of this shape, the last index running fastest.
-    pub fn array(name: &'static str, number: Number, shape: &[u64]) -> Self {
+    pub fn array(name: impl Into<Cow<'static, str>>, number: Number, shape: &[u64]) -> Self {
         let (attributes, content) = (Vec::new(), Content::Array(number, shape.to_vec()));
-        Self { name, attributes, content }
+        Self { name: name.into(), attributes, content }
     }
 
     /// Attaches a list of integers.

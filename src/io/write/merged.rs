@@ -18,6 +18,7 @@ use super::scope::{FaceSet, Scope};
 use tetdb_base::shape::excess_near;
 use tetdb_base::storage::{Sorted, check_cancelled};
 use tetdb_schema::catalog::SubdomainRow;
+use tetdb_schema::labels::LabelSet;
 use tetdb_store::sealed::{SealedError, Shape, Subdomain};
 use tetdb_store::store::Catalog;
 
@@ -97,6 +98,7 @@ pub(super) struct Merged<'a> {
     embedded: WrittenEmbedded,
     support_first: u64,
     label_names: Vec<String>,
+    pub(super) label_sets: Vec<LabelSet>,
     region_names: Vec<String>,
     dir: PathBuf,
     memory: usize,
@@ -117,7 +119,7 @@ impl<'a> Merged<'a> {
         progress: ReadProgress<'a>,
     ) -> Result<Self> {
         let (label_names, region_names) = (store.labels()?, store.region_names()?);
-        let row = store.wires()?;
+        let (label_sets, row) = (store.label_sets()?, store.wires()?);
         let memory = memory_left(&row, memory)?;
         let parts = sources(store, scope, dir, memory)?;
         let numbering = Numbering::new(store, &parts, scope.apart, dir, memory)?;
@@ -145,6 +147,7 @@ impl<'a> Merged<'a> {
             embedded: WrittenEmbedded::default(),
             support_first: row.fin_first,
             label_names,
+            label_sets,
             region_names,
             dir: dir.to_owned(),
             memory,

@@ -22,6 +22,7 @@ mod format;
 mod gmsh;
 mod gmsh22;
 mod hdf5;
+mod label_groups;
 mod medit;
 mod merged;
 mod merged_parts;

@@ -30,7 +30,7 @@ impl<T> Arrays<T> {
         let strip = |column: &TableColumn<T>| {
             let length = rows * column.components * column.number.bytes();
             let file_bytes = HEAD_BYTES as u64 + length;
-            let path = outputs.create(&array_path(out, column.name), file_bytes)?;
+            let path = outputs.create(&array_path(out, &column.name), file_bytes)?;
             let inner = match column.components {
                 1 => String::new(),
                 n => format!(" {n}"),

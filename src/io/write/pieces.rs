@@ -2,6 +2,7 @@
 //!
 //! The faces shared with other sub-domains are boundary faces, labelled `interface_N` by the sub-domain N behind them.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -89,14 +90,14 @@ fn head(outputs: &mut OutputFiles, out: &Path, pieces: &[PathBuf]) -> Result<()>
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
          header_type=\"UInt64\">\n  <PUnstructuredGrid GhostLevel=\"0\">\n",
     );
-    let arrays = |columns: Vec<(&str, Number)>| -> String {
-        let line = |(name, number): (&str, Number)| {
+    let arrays = |columns: Vec<(Cow<'static, str>, Number)>| -> String {
+        let line = |(name, number): (Cow<'static, str>, Number)| {
             format!("      <PDataArray type=\"{}\" Name=\"{name}\"/>\n", number.vtk())
         };
         columns.into_iter().map(line).collect()
     };
-    let points = vtk::vertex_columns().iter().map(|c| (c.name, c.number)).collect();
-    let cells = vtk::tet_columns().iter().map(|c| (c.name, c.number)).collect();
+    let points = vtk::vertex_columns().iter().map(|c| (c.name.clone(), c.number)).collect();
+    let cells = vtk::tet_columns().iter().map(|c| (c.name.clone(), c.number)).collect();
     for (group, columns) in [("PPointData", points), ("PCellData", cells)] {
         stream.text(&format!("    <{group}>\n{}    </{group}>\n", arrays(columns)));
     }

@@ -67,9 +67,12 @@ fn normal(surface: &Surface, t: usize) -> [f64; 3] {
     (b - a).cross(c - a).normalize_or_zero().to_array()
 }
 
-/// A name on one line.
-fn label<'a>(surface: &'a Surface, t: usize) -> std::borrow::Cow<'a, str> {
-    let name = surface.label_name(t as u32);
+/// The name of a triangle's label on one line.
+fn label(surface: &Surface, t: usize) -> std::borrow::Cow<'_, str> {
+    one_line(surface.label_name(t as u32))
+}
+
+fn one_line(name: &str) -> std::borrow::Cow<'_, str> {
     if name.contains(['\n', '\r']) {
         return name.replace(['\n', '\r'], " ").into();
     }
@@ -145,7 +148,19 @@ fn off(surface: &Surface, stream: &mut Stream) -> Result<()> {
     Ok(())
 }
 
+/// Writes OBJ. Labels for several groups are declared in comments, which the reader knows.
 fn obj(surface: &Surface, stream: &mut Stream) -> Result<()> {
+    let names = if surface.label_sets.is_empty() { &[][..] } else { &surface.label_names };
+    for (label, name) in (0u32..).zip(names) {
+        let name = one_line(name);
+        match surface.label_members(&label) {
+            [_] => stream.text(&format!("# tetdb label {name}\n")),
+            members => {
+                let numbers: Vec<String> = members.iter().map(u32::to_string).collect();
+                stream.text(&format!("# tetdb labels {} = {name}\n", numbers.join(" ")));
+            }
+        }
+    }
     for p in &surface.points {
         doubles(stream, "v ", p.to_array());
         stream.end()?;

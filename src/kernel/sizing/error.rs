@@ -8,6 +8,7 @@ impl SizingError {
             Self::Crossed { .. } => Some("hmin"),
             Self::BadFormula { .. } | Self::NoSize { .. } => Some("size_expr"),
             Self::BadRegion { .. } => Some("size_region"),
+            Self::BadLabel { .. } => Some("size_label"),
             Self::SizeCount { .. } => Some("size_field"),
             Self::NoEdges | Self::TooLarge { .. } | Self::Damaged { .. } => None,
         }
@@ -64,6 +65,14 @@ pub enum SizingError {
         /// The region and size found.
         found: String,
         /// The expected value, as a sentence.
+        expected: String,
+    },
+    /// A size is for a label that no triangle has.
+    #[error("size_label {found}: no triangle has this label; there are labels {expected}")]
+    BadLabel {
+        /// The label.
+        found: String,
+        /// The labels there are.
         expected: String,
     },
     /// A file of sizes has another number of them than the surface has vertices.

@@ -5,8 +5,8 @@
 //! its corners are interpolated from the surface's edges (`seeds`, `gather`, `edge_seeds`), joined to the wanted
 //! interior size and graded (`values`); between corners they are trilinear (`field`). Boxes, spheres and cylinders with
 //! sizes of their own are formulas evaluated next to it (`sources`). Expressions (`formula`), sizes of regions
-//! (`region`) and of background meshes (`background`) are sampled into the octree when it is built (`constraints`). The
-//! least of all sizes counts.
+//! (`region`), sizes near labels (`label`) and those of background meshes (`background`) are sampled into the octree
+//! when it is built (`constraints`). The least of all sizes counts.
 //!
 //! The expected mesh follows from the field and the surface: the load inside (`integral`), the numbers of tetrahedra
 //! and vertices (`count`).
@@ -34,6 +34,7 @@ mod formula;
 mod gather;
 mod grading;
 mod integral;
+mod label;
 mod length;
 mod math;
 mod options;
@@ -57,6 +58,7 @@ pub use error::SizingError;
 pub use field::{ExtraSizes, SizeField};
 pub use formula::Formula;
 pub use integral::{Domain, SurfaceSkin};
+pub use label::{LabelSize, NearLabel, list_of_labels};
 pub use length::Length;
 pub use options::{RegionSize, SizeOptions};
 pub use region::Region;

@@ -5,6 +5,7 @@ use std::fmt;
 use super::SizingError;
 use super::closed::slope_of_gradation;
 use super::formula::Formula;
+use super::label::LabelSize;
 use super::length::Length;
 use super::sources::SizeSource;
 
@@ -65,6 +66,9 @@ pub struct SizeOptions {
     pub formula: Option<Formula>,
     /// Lengths of regions; `hmin` bounds them too. The builder of the field turns them into [`Region`](super::Region)s.
     pub regions: Vec<RegionSize>,
+    /// Lengths near the triangles of labels; `hmin` bounds them too. The builder of the field turns them into
+    /// [`NearLabel`](super::NearLabel)s.
+    pub labels: Vec<LabelSize>,
 }
 
 impl SizeOptions {
@@ -93,7 +97,7 @@ impl SizeOptions {
         Ok(options)
     }
 
-    /// Adds other sizes: single values replace those here, shapes and regions join the lists.
+    /// Adds other sizes: single values replace those here, shapes, regions and labels join the lists.
     pub fn add(&mut self, other: &Self) {
         self.hsiz = other.hsiz.or(self.hsiz);
         self.hmin = other.hmin.or(self.hmin);
@@ -101,6 +105,7 @@ impl SizeOptions {
         self.hgrad = other.hgrad.or(self.hgrad);
         self.sources.extend_from_slice(&other.sources);
         self.regions.extend_from_slice(&other.regions);
+        self.labels.extend_from_slice(&other.labels);
         if other.formula.is_some() {
             self.formula.clone_from(&other.formula);
         }
@@ -119,7 +124,8 @@ impl SizeOptions {
             _ => {}
         }
         self.sources.iter().try_for_each(SizeSource::check)?;
-        self.regions.iter().try_for_each(|region| region.h.check("size_region"))
+        self.regions.iter().try_for_each(|region| region.h.check("size_region"))?;
+        self.labels.iter().try_for_each(LabelSize::check)
     }
 
     /// Largest ratio of the lengths of two edges that follow each other.

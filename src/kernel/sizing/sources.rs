@@ -23,15 +23,15 @@ pub enum SourceShape {
     Sphere {
         /// Its center.
         center: Point,
-        /// Its radius.
-        radius: f64,
+        /// Its radius; may be 0.
+        radius: Length,
     },
     /// A full cylinder.
     Cylinder {
         /// Centers of its two ends.
         ends: [Point; 2],
-        /// Its radius.
-        radius: f64,
+        /// Its radius; may be 0.
+        radius: Length,
     },
 }
 
@@ -73,10 +73,7 @@ impl SizeSource {
             expected: "X,Y,Z,R,H or X,Y,Z,R,H,OUTSIDE with R not below zero",
             text,
         };
-        let ([x, y, z, radius], inside, outside) = text.read()?;
-        if radius < 0.0 {
-            return Err(text.bad());
-        }
+        let ([x, y, z], radius, inside, outside) = text.read_round()?;
         let center = Point::new(x, y, z);
         Ok(Self { shape: SourceShape::Sphere { center, radius }, inside, outside })
     }
@@ -91,9 +88,9 @@ impl SizeSource {
             expected: "X0,Y0,Z0,X1,Y1,Z1,R,H or X0,Y0,Z0,X1,Y1,Z1,R,H,OUTSIDE with two different ends",
             text,
         };
-        let ([a, b, c, d, e, f, radius], inside, outside) = text.read()?;
+        let ([a, b, c, d, e, f], radius, inside, outside) = text.read_round()?;
         let ends = [Point::new(a, b, c), Point::new(d, e, f)];
-        if radius < 0.0 || ends[0] == ends[1] {
+        if ends[0] == ends[1] {
             return Err(text.bad());
         }
         Ok(Self { shape: SourceShape::Cylinder { ends, radius }, inside, outside })
@@ -123,7 +120,7 @@ impl SizeSource {
     /// The source for a surface whose box has that diagonal; no size below `least`.
     pub(super) fn resolve(&self, diagonal: f64, least: f64) -> ResolvedSource {
         ResolvedSource {
-            shape: self.shape,
+            shape: self.shape.resolve(diagonal),
             inside: self.inside.resolve(diagonal).max(least),
             outside: self.outside.map_or(f64::INFINITY, |h| h.resolve(diagonal).max(least)),
         }
@@ -138,8 +135,8 @@ impl fmt::Display for SizeSource {
             SourceShape::Sphere { center, radius } => (vec![center], Some(radius)),
             SourceShape::Cylinder { ends, radius } => (ends.to_vec(), Some(radius)),
         };
-        let numbers = points.iter().flat_map(|p| p.to_array()).chain(radius);
-        let lengths = [Some(self.inside), self.outside].into_iter().flatten();
+        let numbers = points.iter().flat_map(|p| p.to_array());
+        let lengths = [radius, Some(self.inside), self.outside].into_iter().flatten();
         let words = numbers.map(|x| x.to_string()).chain(lengths.map(|h| h.to_string()));
         f.write_str(&words.collect::<Vec<_>>().join(","))
     }
@@ -161,6 +158,31 @@ impl SourceText<'_> {
         }
     }
 
+    /// Numbers, a radius, and lengths.
+    fn read_round<const N: usize>(
+        &self,
+    ) -> Result<([f64; N], Length, Length, Option<Length>), SizingError> {
+        let words: Vec<&str> = self.text.split(',').collect();
+        let word = words.get(N).ok_or_else(|| self.bad())?.trim();
+        let radius = match word.parse() {
+            Ok(0.0) => Length::Units(0.0),
+            _ => Length::parse(self.option, word).map_err(|_| SizingError::BadValue {
+                option: self.option,
+                found: format!("{} (in it {word})", self.text),
+                expected: "R to be a length not below zero, such as 0.25, or a share of the box diagonal, such as 1%",
+            })?,
+        };
+        let others = [&words[..N], &words[N + 1..]].concat().join(",");
+        let (numbers, inside, outside) =
+            SourceText { option: self.option, expected: self.expected, text: &others }
+                .read()
+                .map_err(|e| match e {
+                    SizingError::BadValue { found, .. } if found == others => self.bad(),
+                    other => other,
+                })?;
+        Ok((numbers, radius, inside, outside))
+    }
+
     fn read<const N: usize>(&self) -> Result<([f64; N], Length, Option<Length>), SizingError> {
         let words: Vec<&str> = self.text.split(',').collect();
         if words.len() != N + 1 && words.len() != N + 2 {
@@ -172,7 +194,7 @@ impl SourceText<'_> {
             *number = read.filter(|x| x.is_finite()).ok_or_else(|| SizingError::BadValue {
                 option: self.option,
                 found: format!("{} (in it {})", self.text, word.trim()),
-                expected: "a plain number for each coordinate and for a radius; only H and OUTSIDE may be shares such as 2%",
+                expected: "a plain number for each coordinate; only R, H and OUTSIDE may be shares such as 2%",
             })?;
         }
         let length = |i: usize| {
@@ -224,10 +246,18 @@ impl ResolvedSource {
 }
 
 impl SourceShape {
+    /// The shape in input units, for a surface whose box has that diagonal.
+    fn resolve(mut self, diagonal: f64) -> Self {
+        if let Self::Sphere { radius, .. } | Self::Cylinder { radius, .. } = &mut self {
+            *radius = Length::Units(radius.resolve(diagonal));
+        }
+        self
+    }
+
     /// Distance to the boundary, positive inside. Inside a box and a cylinder it is that to the nearest wall.
     fn depth(&self, p: Point) -> f64 {
         match *self {
-            Self::Sphere { center, radius } => radius - p.distance(center),
+            Self::Sphere { center, radius } => radius.resolve(0.0) - p.distance(center),
             Self::Box { low, high } => {
                 let walls = (p - low).min(high - p);
                 let beyond = (-walls).max(Point::ZERO);
@@ -237,7 +267,7 @@ impl SourceShape {
                 let axis = b - a;
                 let length = axis.length();
                 let along = (p - a).dot(axis) / length;
-                let radial = radius - (p - a - axis * (along / length)).length();
+                let radial = radius.resolve(0.0) - (p - a - axis * (along / length)).length();
                 let axial = along.min(length - along);
                 let beyond = glam::DVec2::new((-radial).max(0.0), (-axial).max(0.0));
                 if beyond == glam::DVec2::ZERO { radial.min(axial) } else { -beyond.length() }
@@ -282,6 +312,24 @@ mod tests {
         assert_eq!(small.h(Point::ZERO, beta), 0.1);
         assert_eq!(small.h(Point::splat(9.0), beta), 0.7);
         assert_eq!(small.h(Point::new(2.0, 0.0, 0.0), beta), 0.1 + beta);
+    }
+
+    #[test]
+    fn a_radius_may_be_a_share() {
+        for (text, at, radius) in
+            [("1,0,0,5%,0.1", 10.0, 0.5), ("0,0,0,0,0.1", 1.0, 0.0), ("0,0,0,2,0.1", 1.0, 2.0)]
+        {
+            let source = SizeSource::parse_sphere(text).expect(text);
+            assert_eq!(source.to_string(), text);
+            let SourceShape::Sphere { center, .. } = source.shape else { panic!("{text}") };
+            let h = source.resolve(at, 0.0).h(center + Point::new(radius + 1.0, 0.0, 0.0), 0.3);
+            assert!((h - 0.4).abs() < 1e-12, "{text}: {h}");
+        }
+        let text = "0,0,0,1,0,0,2%,0.1,0.2";
+        assert_eq!(SizeSource::parse_cylinder(text).map(|s| s.to_string()).as_deref(), Ok(text));
+        for text in ["0,0,0,-1%,0.1", "0,0,0,-1,0.1", "0,0,5%,1,0.1"] {
+            assert!(SizeSource::parse_sphere(text).is_err(), "{text}");
+        }
     }
 
     #[test]

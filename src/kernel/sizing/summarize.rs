@@ -170,6 +170,9 @@ fn describe_source(options: &SizeOptions, targets: &Targets) -> String {
     if !options.regions.is_empty() {
         parts.push(plural(options.regions.len(), "region"));
     }
+    if !options.labels.is_empty() {
+        parts.push(plural(options.labels.len(), "label"));
+    }
     if options.formula.is_some() {
         parts.push("size_expr".to_owned());
     }

@@ -54,11 +54,11 @@ impl QuerySession {
     pub fn marks(&mut self, rank: u32, selection: &Selection) -> Result<Option<Marks>, QueryError> {
         let mut marks = None;
         if let Some(labels) = &selection.labels {
-            let fin_first = self.wires.fin_first;
+            let (fin_first, labels) = (self.wires.fin_first, self.labels_within(labels));
             let is_meant =
                 |facet: &SealedFacet| facet.triangle < fin_first && labels.contains(&facet.label);
             let mut found = self.on_facets(rank, is_meant)?;
-            self.add_on_wires(rank, labels, &mut found)?;
+            self.add_on_wires(rank, &labels, &mut found)?;
             marks = Some(found);
         }
         let only = |marks: &mut Option<Marks>, found: Marks| match marks {

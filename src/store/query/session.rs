@@ -16,6 +16,7 @@ use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Budget, Lease, check_cancelled};
 use tetdb_schema::catalog::{Stage, SubdomainRow, WiresRow};
+use tetdb_schema::labels::{self, LabelSet};
 
 /// Memory of one open sub-domain: half for redb, half for decoded vertices.
 const PART_BYTES: u64 = 8 << 20;
@@ -80,6 +81,8 @@ pub struct QuerySession {
     pub rows: Vec<SubdomainRow>,
     /// Names of labels of the surface.
     pub labels: Vec<String>,
+    /// Labels of triangles in several groups.
+    label_sets: Vec<LabelSet>,
     /// Names of regions 1, 2, …; empty for a region without a name.
     pub region_names: Vec<String>,
     /// Embedded edges and points.
@@ -139,7 +142,7 @@ impl QuerySession {
         budget: &Budget,
     ) -> Result<Self, QueryError> {
         let (labels, region_names) = (store.labels()?, store.region_names()?);
-        let wires = store.wires()?;
+        let (label_sets, wires) = (store.label_sets()?, store.wires()?);
         let cap = budget.cap();
         let frames_bytes_max = (cap / 2).min(FRAMES_BYTES_MAX);
         let parts_max = (cap / 4 / PART_BYTES).clamp(1, PARTS_MAX);
@@ -159,6 +162,7 @@ impl QuerySession {
             tree: OctalBoxTree::new(rows.len(), |i| bounds_of(&rows[i])),
             rows,
             labels,
+            label_sets,
             region_names,
             wires,
             bounds,
@@ -208,6 +212,11 @@ impl QuerySession {
     /// Names of the labels; their place is their number.
     pub fn labels(&self) -> &[String] {
         &self.labels
+    }
+
+    /// These labels, and those of triangles that are in all their groups and in others.
+    pub(super) fn labels_within(&self, labels: &[u32]) -> Vec<u32> {
+        labels.iter().flat_map(|&label| labels::labels_within(&self.label_sets, label)).collect()
     }
 
     /// The open sub-domain of this rank.

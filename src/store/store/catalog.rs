@@ -7,6 +7,7 @@ use tetdb_schema::archive::Archivable;
 use tetdb_schema::blob::Blob;
 use tetdb_schema::chunk::is_box;
 use tetdb_schema::digest::Digest;
+use tetdb_schema::labels::LabelSet;
 use tetdb_schema::page::FORMAT_VERSION;
 use tetdb_schema::row::{self as rows, FORMAT_MAGIC, RowKind, blob_key};
 
@@ -377,6 +378,11 @@ impl Catalog {
     /// Names of the labels; a facet's label is a position here.
     pub fn labels(&mut self) -> Result<Vec<String>, StoreError> {
         Ok(self.row(RowKind::Labels.key(0, 0))?.unwrap_or_default())
+    }
+
+    /// Labels that stand for several, ascending; none where no triangle has two.
+    pub fn label_sets(&mut self) -> Result<Vec<LabelSet>, StoreError> {
+        Ok(self.row(RowKind::LabelSets.key(0, 0))?.unwrap_or_default())
     }
 
     /// The regions, as they were set.

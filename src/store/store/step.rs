@@ -8,6 +8,7 @@ use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
     SubdomainRow, TopologyRow, WiresRow,
 };
+use tetdb_schema::labels::LabelSet;
 use tetdb_schema::row::{self as rows, BLOB_PIECE, RowKind, blob_key};
 
 /// Rows to set and remove, files to list and forget; applied together by [`crate::store::Catalog::commit`].
@@ -57,6 +58,11 @@ impl Step {
     /// Sets the names of the labels.
     pub fn set_labels(&mut self, labels: &Vec<String>) {
         self.put(RowKind::Labels.key(0, 0), labels);
+    }
+
+    /// Sets the labels that stand for several.
+    pub fn set_label_sets(&mut self, sets: &Vec<LabelSet>) {
+        self.put(RowKind::LabelSets.key(0, 0), sets);
     }
 
     /// Sets the regions.

@@ -9,7 +9,7 @@ use tetdb_base::surface::{orient_alike, validate};
 use tetdb_engine::pipeline::MeshOptions;
 use tetdb_io::read::{Format, read_memory};
 use tetdb_kernel::samples::SampleSpec;
-use tetdb_kernel::sizing::{RegionSize, SizeOptions, SizeSource};
+use tetdb_kernel::sizing::{LabelSize, RegionSize, SizeOptions, SizeSource};
 use tetdb_schema::chunk::{
     ChunkAddress, ChunkKind, ChunkRecord, Decoder, HEAD_BYTES, RangeSummary, TetSummary,
     VertexSummary,
@@ -52,6 +52,8 @@ pub const TARGETS: &[Target] = &[
     reader("gmsh", Format::Gmsh, |bytes| read(Format::Gmsh, bytes)),
     reader("smesh", Format::TetgenSmesh, |bytes| read(Format::TetgenSmesh, bytes)),
     reader("poly", Format::TetgenPoly, |bytes| read(Format::TetgenPoly, bytes)),
+    reader("3mf", Format::ThreeMf, |bytes| read(Format::ThreeMf, bytes)),
+    reader("gii", Format::Gifti, |bytes| read(Format::Gifti, bytes)),
     text("expr", expression),
     text("config", config),
     text("option", option),
@@ -106,13 +108,14 @@ fn option(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(rest) else {
         return;
     };
-    match which % 7 {
+    match which % 8 {
         0 => drop(SizeOptions::parse(Some(text), Some(text), Some(text), None)),
         1 => drop(SizeOptions::parse(None, None, None, Some(text))),
         2 => drop(SizeSource::parse_box(text)),
         3 => drop(SizeSource::parse_sphere(text)),
         4 => drop(SizeSource::parse_cylinder(text)),
         5 => drop(RegionSize::parse(text)),
+        6 => drop(LabelSize::parse(text)),
         _ => drop(SampleSpec::parse(text)),
     }
 }

@@ -5,7 +5,10 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use serde_json::json;
-use tetdb::{Bytes, CancelToken, Existing, Mesher, Optimize, Regions, Settings, Store, Subdomains};
+use tetdb::{
+    Bytes, CancelToken, EmbedOutside, Existing, Mesher, Optimize, Regions, Settings, Store,
+    Subdomains,
+};
 
 use crate::failure::Failure;
 use crate::sizes::SizeWords;
@@ -21,6 +24,7 @@ pub struct JobWords<'py> {
     seeds: Vec<([f64; 3], Option<String>)>,
     holes: Vec<[f64; 3]>,
     refine_surface: bool,
+    skips_outside: bool,
     optimize: String,
     subdomains: Option<u32>,
     keep_coarse: bool,
@@ -74,7 +78,11 @@ fn mesher(py: Python<'_>, surface: &Surface, job: &JobWords<'_>) -> PyResult<Mes
         .optimize(optimize)
         .subdomains(subdomains)
         .keep_coarse(job.keep_coarse)
-        .refine_surface(job.refine_surface);
+        .refine_surface(job.refine_surface)
+        .embed_outside(match job.skips_outside {
+            true => EmbedOutside::Skip,
+            false => EmbedOutside::Error,
+        });
     if let Some(regions) = regions {
         mesher = mesher.regions(regions);
     }

@@ -32,6 +32,7 @@ pub struct SizeWords<'py> {
     hgrad: Option<f64>,
     shapes: Vec<ShapeWords>,
     regions: Vec<(String, LengthWords)>,
+    labels: Vec<(String, LengthWords, Option<LengthWords>)>,
     expression: Option<String>,
     file: Option<String>,
     field: Option<FieldWords<'py>>,
@@ -63,6 +64,9 @@ impl SizeWords<'_> {
         }
         for (name, h) in &self.regions {
             sizes = sizes.in_region(name, length(*h));
+        }
+        for (label, h, distance) in &self.labels {
+            sizes = sizes.near_label(label, length(*h), distance.map(length));
         }
         if let Some(text) = &self.expression {
             sizes = sizes.expression(text);

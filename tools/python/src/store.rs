@@ -168,7 +168,7 @@ impl Store {
             let words = json!({
                 "n_tets": s.n_tets, "n_vertices": s.n_vertices, "bytes": s.bytes,
                 "digest": s.digest, "input_triangles": s.input_triangles, "is_verified": s.is_verified,
-                "worst_quality": s.worst_quality, "labels": s.labels, "regions": s.regions,
+                "worst_quality": s.worst_quality, "labels": s.labels, "label_sets": s.label_sets, "regions": s.regions,
                 "subdomains": s.subdomains, "interfaces": s.interfaces,
             });
             Ok(words.to_string())

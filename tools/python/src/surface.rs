@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use serde_json::json;
 use tetdb::{CancelToken, CellArrays, DefectPlace, Seed, SeedKind};
 
-use crate::sizes::length;
+use crate::sizes::{LengthWords, length};
 use crate::watched::watched;
 
 /// A surface; several may share its memory, and nobody changes it.
@@ -59,7 +59,8 @@ impl Surface {
         };
         made(py, move || {
             let labels = labels.as_ref().map(|(names, codes)| named(names, codes));
-            tetdb::Surface::from_arrays(&points, &triangles, labels.as_deref())
+            let surface = tetdb::Surface::from_arrays(&points, &triangles, labels.as_deref())?;
+            grouped(surface)
         })
     }
 
@@ -85,7 +86,7 @@ impl Surface {
             let cells = CellArrays { counts: &counts, corners: &corners, names: labels.as_deref() };
             let surface = match is_volume {
                 true => tetdb::Surface::boundary_of_cells(&points, cells)?,
-                false => tetdb::Surface::from_polygons(&points, cells)?,
+                false => grouped(tetdb::Surface::from_polygons(&points, cells)?)?,
             };
             Ok(notes.into_iter().fold(surface, tetdb::Surface::noted))
         })
@@ -117,6 +118,11 @@ impl Surface {
 
     fn triangles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u32>> {
         rows(py, bytemuck::cast_slice(self.inner.triangles()), 3)
+    }
+
+    /// Labels of triangles in several groups, and the labels of those.
+    fn label_sets(&self) -> Vec<(u32, Vec<u32>)> {
+        self.inner.label_sets().iter().map(|set| (set.label, set.members.clone())).collect()
     }
 
     /// Names, and for each triangle a position among them.
@@ -180,13 +186,15 @@ impl Surface {
         })
     }
 
-    /// Edges of a file, or, with `points`, of arrays; if it `divides`, triangles are divided where ends lie on them.
+    /// Edges of a file, or, with `points`, of arrays; if it `divides`, triangles are divided where ends lie on them, and ends nearer than
+    /// `snap` are moved there.
     fn embedded_edges(
         &self,
         py: Python<'_>,
         edges: EdgesGiven<'_>,
         name: String,
         divides: bool,
+        snap: Option<LengthWords>,
     ) -> PyResult<Self> {
         let given = match edges {
             EdgesGiven::File(file) => Err(file),
@@ -197,7 +205,7 @@ impl Surface {
             )),
         };
         made(py, || {
-            let surface = self.to_embed_in(divides);
+            let surface = self.to_embed_in(divides, snap);
             match given {
                 Err(file) => surface.embedded_edges(file, Some(&name)),
                 Ok((points, edges, labels)) => {
@@ -215,6 +223,7 @@ impl Surface {
         points: PointsGiven<'_>,
         name: String,
         divides: bool,
+        snap: Option<LengthWords>,
     ) -> PyResult<Self> {
         let given = match points {
             PointsGiven::File(file) => Err(file),
@@ -223,7 +232,7 @@ impl Surface {
             }
         };
         made(py, || {
-            let surface = self.to_embed_in(divides);
+            let surface = self.to_embed_in(divides, snap);
             match given {
                 Err(file) => surface.embedded_points(file, Some(&name)),
                 Ok((points, labels)) => {
@@ -244,11 +253,14 @@ impl Surface {
 }
 
 impl Surface {
-    fn to_embed_in(&self, divides: bool) -> tetdb::Surface {
-        let surface = tetdb::Surface::clone(&self.inner);
-        match divides {
-            true => surface.dividing(),
-            false => surface,
+    fn to_embed_in(&self, divides: bool, snap: Option<LengthWords>) -> tetdb::Surface {
+        let mut surface = tetdb::Surface::clone(&self.inner);
+        if divides {
+            surface = surface.dividing();
+        }
+        match snap {
+            Some(within) => surface.snapping(length(within)),
+            None => surface,
         }
     }
 }
@@ -265,6 +277,20 @@ pub enum EdgesGiven<'py> {
 pub enum PointsGiven<'py> {
     File(PathBuf),
     Arrays(PyReadonlyArray2<'py, f64>, Option<Vec<String>>),
+}
+
+/// Stands between the names of the groups of a triangle that is in several.
+const TOGETHER: char = '\u{1f}';
+
+/// The surface with triangles in all groups that their labels name.
+fn grouped(surface: tetdb::Surface) -> Result<tetdb::Surface, tetdb::Error> {
+    let names: Vec<String> =
+        surface.labels().iter().filter(|name| name.contains(TOGETHER)).cloned().collect();
+    let groups: Vec<(&str, Vec<&str>)> =
+        names.iter().map(|name| (name.as_str(), name.split(TOGETHER).collect())).collect();
+    let groups: Vec<(&str, &[&str])> =
+        groups.iter().map(|(name, groups)| (*name, groups.as_slice())).collect();
+    surface.with_groups(&groups)
 }
 
 fn named<'a>(names: &'a [String], codes: &[i64]) -> Vec<&'a str> {

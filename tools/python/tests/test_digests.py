@@ -102,5 +102,14 @@ def test_points_on_triangles_are_put_in_where_the_surface_is_refined(run: Callab
         assert store.merged().points.tolist().count([0.3, 0.4, 1.0]) == 1
     run("verify", "s", "--full")
     near: dict[str, Any] = {"sensors": [[0.3, 0.4, 1.0 - 1e-13]]}
+    with tetdb.mesh(box, tmp_path / "moved", snap_embedded="1%", embed_points=near, hsiz=0.3) as store:
+        assert [0.3, 0.4, 1.0] in store.merged().points.tolist()
+    outside: dict[str, Any] = {"sensors": [[0.3, 0.4, 0.5], [9.0, 0.4, 0.5]]}
+    with pytest.raises(tetdb.TetdbError, match="nothing is filled"):
+        tetdb.mesh(box, tmp_path / "out", embed_points=outside, hsiz=0.3)
+    with tetdb.mesh(box, tmp_path / "in", embed_outside="skip", embed_points=outside, hsiz=0.3) as store:
+        assert "sensors" in store.labels
+    with tetdb.mesh(box, tmp_path / "near_label", size=tetdb.NearLabel("box", 0.1, "5%")) as store:
+        assert store.n_tets > 2000
     with pytest.raises(tetdb.TetdbError, match="e-1[34] from it"):
         tetdb.mesh(box, tmp_path / "near", refine_surface=True, embed_points=near, hsiz=0.3)

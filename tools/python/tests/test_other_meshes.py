@@ -211,3 +211,36 @@ def test_masked_arrays_are_not_read_through_their_masks() -> None:
     with pytest.raises(tetdb.SurfaceError, match="masked"):
         tetdb.Surface(np.ma.masked_array(TET, mask=np.eye(4, 3, dtype=bool)), TRIANGLES)
     assert tetdb.Surface(np.ma.masked_array(TET), TRIANGLES).n_triangles == 4
+
+
+def names_of(surface: tetdb.Surface) -> dict[str, list[int]]:
+    return {name: list(map(int, rows)) for name, rows in surface.groups.items()}
+
+
+def test_cell_sets_of_meshio_may_overlap() -> None:
+    meshio = pytest.importorskip("meshio")
+    sets = {"wall": [np.array([0, 1, 2])], "in": [np.array([2, 2, 3])], "wet": [np.array([3])]}
+    mesh = meshio.Mesh(TET, [("triangle", TRIANGLES)], cell_sets=sets)
+    surface = quiet(mesh)
+    assert names_of(surface) == {"wall": [0, 1, 2], "in": [2, 3], "wet": [3]}
+    assert list(surface.labels) == ["wall", "wall", "wall+in", "in+wet"]
+    assert names_of(pickle.loads(pickle.dumps(surface))) == names_of(surface)
+    back = meshio.Mesh(surface.points, [("triangle", surface.triangles)], cell_sets={name: [rows] for name, rows in surface.groups.items()})
+    assert names_of(quiet(back)) == names_of(surface)
+    # Polygons, in two blocks, with triangles in no set.
+    blocks = [("quad", QUADS), ("triangle", TRIANGLES + 8)]
+    both = meshio.Mesh(np.vstack([CUBE, TET]), blocks, cell_sets={"a": [np.array([0]), np.array([1])], "b": [np.array([0, 1]), None]})
+    assert names_of(quiet(both)) == {"a": [0, 1, 13], "b": [0, 1, 2, 3], "surface": [*range(4, 13), 14, 15]}
+    volume = meshio.Mesh(CUBE, [("hexahedron", HEXAHEDRON)], cell_sets={"rock": [np.array([0])], "wet": [np.array([0])]})
+    assert set(quiet(volume, "1 volume cells are in several sets").labels) == {"rock"}
+
+
+def test_labels_may_be_several_names(tmp_path: Any) -> None:
+    surface = tetdb.Surface(TET, TRIANGLES, ["wall", ("wall", "in"), ["wall"], {"in", "a+b"}])
+    assert list(surface.labels) == ["wall", "wall+in", "wall", 'in+"a+b"']
+    with tetdb.mesh(surface, tmp_path / "a.tetdb", hsiz=0.4) as store:
+        assert store.labels == ["wall", "in", "wall+in", "a+b", 'in+"a+b"']
+        assert store.label_sets == {"wall+in": ["wall", "in"], 'in+"a+b"': ["in", "a+b"]}
+        assert len(store.query(labels=["in"])) >= len(store.query(labels=["wall+in"])) > 0
+    with pytest.raises(tetdb.SurfaceError, match="one name at least"):
+        tetdb.Surface(TET, TRIANGLES, ["wall", (), ["wall"], "in"])

@@ -249,7 +249,7 @@ impl<'a> Run<'a> {
                 (mesh, kernel)
             }
         };
-        let label_names = surface.label_names.clone();
+        let (label_names, label_sets) = (surface.label_names.clone(), surface.label_sets.clone());
         let wires = surface.has_embedded().then(|| wires_row(&surface));
         let n_triangles = surface.n_input_triangles();
         // The mesh holds all data of the surface that the following code needs.
@@ -276,6 +276,9 @@ impl<'a> Run<'a> {
         self.catalog.commit(|step| {
             step.list_file(0, COARSE);
             step.set_labels(&label_names);
+            if !label_sets.is_empty() {
+                step.set_label_sets(&label_sets);
+            }
             step.set_regions(&report.regions.list.iter().map(region_row).collect());
             let names = report.regions.names();
             if !names.is_empty() {

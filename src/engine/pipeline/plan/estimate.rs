@@ -16,7 +16,8 @@ use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface, VOLUMES_TRIANGLE};
 use tetdb_kernel::boundary::{Filled, RegionPolicy};
 use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::{
-    Background, Domain, ExtraSizes, Region, SizeConstraint, SizeField, SizeSummary, TetCounts,
+    Background, Domain, ExtraSizes, NearLabel, Region, SizeConstraint, SizeField, SizeSummary,
+    TetCounts,
 };
 use tetdb_store::sealed::Form;
 
@@ -152,9 +153,11 @@ fn prepare_in(
     }
     let requested = &options.mesh.sizes;
     let isolated_points = surface.isolated_points();
+    let labels = NearLabel::all(surface, &requested.labels, requested.beta(), scratch)?;
     let built = |regions: &[Region]| {
         let mut constraints: Vec<&dyn SizeConstraint> =
             regions.iter().map(|r| r as &dyn SizeConstraint).collect();
+        constraints.extend(labels.iter().map(|near| near as &dyn SizeConstraint));
         let mut at_vertices = None;
         match background {
             Some(Background::Mesh(mesh)) => constraints.push(&**mesh),
@@ -209,11 +212,13 @@ fn notes(chosen: &Filled, options: &Options, n: u32) -> Vec<String> {
     let (unnamed, empty) = (filled - chosen.names.len(), n as usize - filled);
     let mut notes = Vec::new();
     if !chosen.names.is_empty() && unnamed > 0 {
-        notes.push(format!("{unnamed} of {filled} filled regions have no name"));
+        let has = if unnamed == 1 { "has" } else { "have" };
+        notes.push(format!("{unnamed} of {filled} filled regions {has} no name"));
     }
     let policy = options.mesh.regions.policy;
     if matches!(policy, RegionPolicy::Seeds | RegionPolicy::AllButHoles) && empty > 0 {
-        notes.push(format!("{empty} of {n} regions stay empty: no seed is inside, or a hole"));
+        let stays = if empty == 1 { "stays" } else { "stay" };
+        notes.push(format!("{empty} of {n} regions {stays} empty: no seed is inside, or a hole"));
     }
     notes
 }

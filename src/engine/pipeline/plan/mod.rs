@@ -16,4 +16,4 @@ pub use memory::{MEMORY_MIN, Plan};
 pub use option_text::OptionsText;
 pub use options::{EmbedOutside, MeshOptions, Options, RunOptions, SizeFile, Subdomains, Trial};
 pub use recipe::{RECIPE, recipe_of, record_recipe};
-pub use regions::{OuterEmbedded, outer_embedded};
+pub use regions::{OuterEmbedded, outer_embedded, refuse_outer};

@@ -9,7 +9,9 @@ use super::options::{MeshOptions, SizeFile, Subdomains};
 use crate::pipeline::error::PipelineError;
 use tetdb_base::surface::{Seed, SeedKind};
 use tetdb_kernel::boundary::{RegionPolicy, RegionRule};
-use tetdb_kernel::sizing::{Formula, Length, RegionSize, SizeOptions, SizeSource, SizingError};
+use tetdb_kernel::sizing::{
+    Formula, LabelSize, Length, RegionSize, SizeOptions, SizeSource, SizingError,
+};
 use tetdb_schema::word::Word as _;
 
 /// Options as text, one key each. Lengths are numbers or shares of the box diagonal such as `1%`; shapes and seeds are numbers
@@ -41,6 +43,9 @@ pub struct OptionsText {
     /// Sizes of regions.
     #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
     pub size_region: Vec<String>,
+    /// Sizes near labels.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub size_label: Vec<String>,
     /// Edge length as an expression in x, y and z.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_expr: Option<String>,
@@ -102,6 +107,7 @@ impl OptionsText {
             size_sphere: sources("size_sphere"),
             size_cylinder: sources("size_cylinder"),
             size_region: sizes.regions.iter().map(RegionSize::to_string).collect(),
+            size_label: sizes.labels.iter().map(LabelSize::to_string).collect(),
             size_expr: sizes.formula.as_ref().map(Formula::to_string),
             size_field: file.map(|file| file.path.clone()),
             size_field_hash: file.and_then(|file| file.hash.clone()),
@@ -122,6 +128,7 @@ impl OptionsText {
             size_sphere: list(self.size_sphere, other.size_sphere),
             size_cylinder: list(self.size_cylinder, other.size_cylinder),
             size_region: list(self.size_region, other.size_region),
+            size_label: list(self.size_label, other.size_label),
             size_expr: other.size_expr.or(self.size_expr),
             size_field: other.size_field.or(self.size_field),
             size_field_hash: other.size_field_hash.or(self.size_field_hash),
@@ -157,6 +164,11 @@ impl OptionsText {
                 .size_region
                 .iter()
                 .map(|t| RegionSize::parse(t))
+                .collect::<Result<_, _>>()?,
+            labels: self
+                .size_label
+                .iter()
+                .map(|t| LabelSize::parse(t))
                 .collect::<Result<_, _>>()?,
             ..SizeOptions::parse(hsiz, hmin, hmax, hgrad)?
         })
@@ -373,6 +385,7 @@ mod tests {
             size_sphere: list("0,0,0,1,0.1,2%"),
             size_cylinder: list("0,0,0,1,1,1,2,0.1"),
             size_region: list("rock,0.2"),
+            size_label: list("wall,0.05,1%"),
             size_expr: some("x + 1"),
             size_field: some("/a/sizes.sol"),
             size_field_hash: some("12"),

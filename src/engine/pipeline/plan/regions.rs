@@ -8,7 +8,8 @@ use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{EnclosedVolumes, OUTSIDE, Seeker, Surface};
 use tetdb_kernel::boundary::{BoundaryError, Filled};
-use tetdb_kernel::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError};
+use tetdb_kernel::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError, list_of_labels};
+use tetdb_schema::labels::labels_within;
 
 /// Share of the box diagonal below which a seed counts as on the surface. The side of a seed comes from sums of doubles, with an
 /// error of some 1e-16 of the diagonal, and a thousand times more where triangles are steep.
@@ -59,7 +60,8 @@ fn find(
     let name = which.strip_prefix("label:").unwrap_or(which);
     let label = surface.label_names.iter().position(|known| known == name);
     let label = label.ok_or_else(unknown)?;
-    for v in domain.volumes.enclosed_by(surface, label as u32) {
+    let labels = labels_within(&surface.label_sets, label as u32);
+    for v in domain.volumes.enclosed_by(surface, &labels) {
         is_here[v as usize] = filled[v as usize];
     }
     match is_here.contains(&true) {
@@ -69,13 +71,7 @@ fn find(
 }
 
 fn unknown(which: &str, surface: &Surface, n_regions: usize) -> SizingError {
-    /// Largest number of names listed in the message.
-    const LISTED: usize = 12;
-    let names = &surface.label_names;
-    let mut list = names[..names.len().min(LISTED)].join(", ");
-    if names.len() > LISTED {
-        list += ", …";
-    }
+    let list = list_of_labels(surface);
     SizingError::BadRegion {
         found: which.to_owned(),
         expected: format!(
@@ -201,6 +197,19 @@ impl OuterEmbedded {
         let (n, at, distance) = (n as u64, ends[0].midpoint(ends[1]), a.min(b));
         Err(PipelineError::WireOutside { what, name, distance, at, n })
     }
+}
+
+/// Refuses sheets, embedded edges and embedded points outside the regions that `options` fill. Errors: as [`outer_embedded`].
+pub fn refuse_outer(
+    surface: &Surface,
+    options: &Options,
+    scratch: &ScratchSpace,
+) -> Result<(), PipelineError> {
+    let seeker = Seeker::with_filter(surface, scratch, |_| true);
+    let volumes = EnclosedVolumes::new_in(&seeker, scratch);
+    let chosen = chosen(&seeker, &volumes, options)?;
+    refuse_outer_sheets(surface, &volumes, &chosen)?;
+    OuterEmbedded::find(surface, &seeker, &volumes, &chosen).refuse(surface, scratch)
 }
 
 /// Finds embedded edges and points outside the regions that `options` fill. Errors: seeds that fit no region.

@@ -18,9 +18,9 @@ fn abaqus() {
     let surface = read_tetrahedron(Format::Abaqus, ABAQUS);
     assert_eq!(
         (surface.label_names, surface.labels),
-        (vec!["top".into(), "rest".into()], vec![0, 0, 1, 1])
+        (vec!["top".into(), "x".into(), "top+x".into(), "rest".into()], vec![2, 2, 3, 3])
     );
-    assert_eq!((surface.notes.len(), surface.seeds.len()), (5, 1));
+    assert_eq!((surface.notes.len(), surface.seeds.len()), (4, 1));
     let two = ABAQUS.replace("*NODE,", "*PART, NAME=a\n*NODE,");
     let two = two.clone()
         + "*PART, NAME=b\n"

@@ -193,20 +193,3 @@ fn old_versions_are_read() {
     let parametric = "$ParametricNodes\n4\n11 0 0 0 0 1\n12 1 0 0 1 2 0.5\n13 0 1 0 2 1 0.5 7\n24 0 0 1 3 1\n$EndParametricNodes";
     read_tetrahedron(Format::Gmsh, MSH2.replace(nodes, parametric));
 }
-
-#[test]
-fn groups_beside_the_first_are_noted() {
-    let names = |surface: &Surface| {
-        let names = surface.notes.iter().find_map(|n| match &n.kind {
-            NoteKind::OtherGroups { names } => Some(names.clone()),
-            _ => None,
-        });
-        names.unwrap_or_default()
-    };
-    let twice = "2 2 2 3 1 12 13 24\n7 2 2 4 1 12 13 24\n";
-    let text = MSH2.replace("$Elements\n6", "$Elements\n7").replace("2 2 2 3 1 12 13 24\n", twice);
-    let surface = read_tetrahedron(Format::Gmsh, text);
-    assert_eq!(names(&surface), "4");
-    let text = MSH4.replace("1 0 0 0 1 1 1 1 3 0", "1 0 0 0 1 1 1 2 3 -7 0");
-    assert_eq!(names(&read_tetrahedron(Format::Gmsh, text)), "7");
-}

@@ -44,11 +44,11 @@ fn elements_beside_faces_are_noted() {
     noted(
         Format::Ply,
         head("element polygon 1\nproperty list uchar int v") + "3 0 1 2\n",
-        &["1 records of the element `polygon`"],
+        &["1 record of the element `polygon` was left out"],
     );
     noted(Format::Ply, head("element edge 0\nproperty int vertex1"), &[]);
-    noted(Format::Medit, MEDIT, &["1 edges", "1 tetrahedra"]);
-    noted(Format::Gmsh, MSH2, &["1 lines and points", "1 solid elements"]);
+    noted(Format::Medit, MEDIT, &["1 of the edges", "1 of the tetrahedra"]);
+    noted(Format::Gmsh, MSH2, &["1 of the lines and points", "1 of the solid elements"]);
     let obj = indexed(|v| (v + 1).to_string(), "v ", "f ", "");
     noted(Format::Obj, format!("mtllib a\ns 1\nvn 0 0 1\n{obj}"), &[]);
     noted(
@@ -94,7 +94,11 @@ fn curved_faces_of_medit_are_refused_and_curved_cells_noted() {
         assert_eq!(refuse(Format::Medit, MEDIT.replace("End", &curved)).0, "unsupported-content");
     }
     let cells = format!("HexahedraQ2\n1\n{}0\nTrianglesP2Ordering\n1\n0 0 0\nEnd", "1 ".repeat(27));
-    noted(Format::Medit, MEDIT.replace("End", &cells), &["1 edges", "1 tetrahedra", "1 hexahedra"]);
+    noted(
+        Format::Medit,
+        MEDIT.replace("End", &cells),
+        &["1 of the edges", "1 of the tetrahedra", "1 of the hexahedra"],
+    );
     let mut binary = meshb(2, false);
     binary.truncate(binary.len() - 8);
     for (number, is_good) in [(13i32, true), (27, false), (88, false), (90, false), (91, false)] {
@@ -127,7 +131,7 @@ fn nastran_tabs_indents_and_shear_panels() {
     assert_eq!(noted(Format::Nastran, tabs, &[]).label_names, ["5"]);
     noted(Format::Nastran, tabs.replace("CTRIA3\t4", " CTRIA3\t4"), &[]);
     noted(Format::Nastran, format!("{tabs}CTUBE,7,1,1,2\nCGAP,8,1,1,2\n"), &["2 beams"]);
-    noted(Format::Nastran, format!("{tabs}CPENTA\t9\t6\t1\t2\t3\t1\t2\t4\n"), &["1 solid"]);
+    noted(Format::Nastran, format!("{tabs}CPENTA\t9\t6\t1\t2\t3\t1\t2\t4\n"), &["1 of the solid"]);
     let panel = format!("{tabs}GRID,5,,1.,1.,0.\nCSHEAR,7,1,1,2,5,3\n");
     assert_eq!(read(Format::Nastran, panel).unwrap().n_triangles(), 6);
     // The end of a full field is a tab stop itself.
@@ -156,9 +160,10 @@ fn unv_groups_of_all_versions() {
     // A rod may have a line for its orientation.
     for rod in ["9 11 1 1 7 2\n0 1 1\n1 2\n", "9 11 1 1 7 2\n1 2\n", "9 21 1 1 7 2\n0 1 1\n1 2\n"] {
         let with_rod = mesh.replace("1 91 1", &format!("{rod}1 91 1"));
-        noted(Format::Unv, with_rod, &["1 beams"]);
+        noted(Format::Unv, with_rod, &["1 of the beams"]);
     }
-    noted(Format::Unv, group("2432", &pairs.replace("8 4", "8 3")), &["groups high"]);
+    let both = noted(Format::Unv, group("2432", &pairs.replace("8 4", "8 3")), &[]);
+    assert_eq!(both.label_names, ["low", "high", "low+high", "part"]);
     assert_eq!(
         refuse(Format::Unv, group("2467", &fours.replace("\n8 3 0 0", ""))).0,
         "unexpected-text"

@@ -19,6 +19,19 @@ fn tetgen_layouts() {
     assert_eq!(surface.notes[0].kind, NoteKind::CutFacets { n: 1 });
     assert_eq!(surface.notes[1].kind, NoteKind::Edges { n: 1 });
     assert_eq!(
+        surface.notes[1].to_string(),
+        "folder/part.x: 1 polygon of two corners is an edge, embedded where the surface is meshed"
+    );
+    // Of the unused vertices, the end of an edge is none.
+    let more = poly
+        .replace("4 3 0 0\n", "6 3 0 0\n")
+        .replace("3 0 0 1\n", "3 0 0 1\n4 .1 .1 .1\n5 .2 .1 .1\n");
+    let edge = more.replace("2 0 1\n", "2 0 4\n");
+    let unused =
+        |text: &str| read(Format::TetgenPoly, text).unwrap().notes.last().unwrap().to_string();
+    assert!(unused(&more).ends_with("2 vertices belong to no triangle and were left out"));
+    assert!(unused(&edge).ends_with("1 vertex belongs to no triangle and was left out"));
+    assert_eq!(
         refuse(Format::TetgenSmesh, smesh.replace("3 1 2 3 5", "3 1 2 4 5")),
         ("index-out-of-range", Spot::Line(8))
     );

@@ -83,6 +83,7 @@ fn names(mesh: &mut Merged, walk: &FaceWalk) -> Result<Names> {
     let regions = mesh.filled_regions()?;
     Ok(Names {
         patches: patches.iter().map(named).collect(),
+        groups: mesh.overlapping_groups(),
         face_zones: census.zones.keys().map(named).collect(),
         cell_zones: set_names(&regions.iter().map(|&r| (r, mesh.region_name(r))).collect()),
     })

@@ -1,6 +1,6 @@
 //! The files of one `polyMesh` folder.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::super::error::Result;
@@ -16,8 +16,18 @@ pub(super) fn mesh_dir(root: &Path) -> PathBuf {
 /// Names of patches and zones by label and region, in the order in which they are written.
 pub(super) struct Names {
     pub patches: BTreeMap<u32, String>,
+    /// Groups of patches, where faces are in several.
+    pub groups: Vec<(String, BTreeSet<u32>)>,
     pub face_zones: BTreeMap<u32, String>,
     pub cell_zones: BTreeMap<u32, String>,
+}
+
+impl Names {
+    /// Groups of the patch of a label.
+    pub fn groups_of(&self, label: u32) -> Vec<String> {
+        let own = self.groups.iter().filter(|(_, labels)| labels.contains(&label));
+        own.map(|(name, _)| name.clone()).collect()
+    }
 }
 
 /// Counts of a mesh.
@@ -113,6 +123,8 @@ pub(super) struct FoamPatch {
     pub name: String,
     /// This processor and the one behind the patch.
     pub between: Option<[usize; 2]>,
+    /// Groups of the patch; none where there are no faces in several.
+    pub groups: Vec<String>,
     pub n_faces: u64,
 }
 
@@ -128,7 +140,12 @@ pub(super) fn write_boundary(
     file.text(&format!("{}\n(\n", patches.len()));
     for patch in patches {
         let kind = match patch.between {
-            None => "        type            patch;\n".to_owned(),
+            None if patch.groups.is_empty() => "        type            patch;\n".to_owned(),
+            None => format!(
+                "        type            patch;\n        inGroups        {}({});\n",
+                patch.groups.len(),
+                patch.groups.join(" ")
+            ),
             Some([here, there]) => format!(
                 "        type            processor;\n        inGroups        1(processor);\n        matchTolerance  0.0001;\n        \
                  transform       unknown;\n        myProcNo        {here};\n        neighbProcNo    {there};\n"

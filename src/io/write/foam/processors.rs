@@ -223,11 +223,13 @@ impl ProcessorFiles<'_> {
         let plain = self.names.patches.iter().map(|(label, name)| FoamPatch {
             name: name.clone(),
             between: None,
+            groups: self.names.groups_of(*label),
             n_faces: counts.get(label).copied().unwrap_or_default(),
         });
         let shared = walk.census.between[p].iter().map(|(&there, &n_faces)| FoamPatch {
             name: format!("procBoundary{here}to{there}"),
             between: Some([here as usize, there as usize]),
+            groups: Vec::new(),
             n_faces,
         });
         let patches: Vec<_> = plain.chain(shared).collect();

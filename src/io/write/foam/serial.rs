@@ -68,6 +68,7 @@ pub(super) fn write(
     let patches = names.patches.iter().map(|(label, name)| FoamPatch {
         name: name.clone(),
         between: None,
+        groups: names.groups_of(*label),
         n_faces: (census.patches.iter().filter_map(|p| p.get(label))).sum(),
     });
     write_boundary(outputs, &dir, inner, &patches.collect::<Vec<_>>())?;

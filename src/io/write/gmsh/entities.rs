@@ -27,6 +27,8 @@ pub(super) struct Entities {
     /// Ranks of all partitions, also of those in other files.
     ranks: Vec<u32>,
     n_labels: u32,
+    /// Labels of faces in several groups, with the labels of those.
+    sets: BTreeMap<u32, Vec<u32>>,
     /// Embedded edges and points: edges are in a curve for each label, each point is an entity of its own, numbered from 1. A file of one
     /// partition has none.
     pub embedded: WrittenEmbedded,
@@ -42,6 +44,11 @@ impl Entities {
             bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             ranks: parts.iter().map(|part| part.rank).collect(),
             n_labels: mesh.n_labels(),
+            sets: mesh
+                .labels()
+                .into_keys()
+                .map(|label| (label, mesh.label_members(label)))
+                .collect(),
             embedded: WrittenEmbedded::default(),
         };
         if piece.which.len() == parts.len() {
@@ -147,19 +154,27 @@ impl Entities {
         labels.filter(|&label| self.neighbor(label).is_none()).collect()
     }
 
+    /// The physical tags of a label.
+    fn physical(&self, label: u32) -> Vec<u32> {
+        let members = self.sets.get(&label).cloned().unwrap_or_else(|| vec![label]);
+        members.into_iter().map(|member| member + 1).collect()
+    }
+
     fn regions(&self) -> BTreeSet<u32> {
         self.volumes.iter().map(|(key, _)| key.0).collect()
     }
 
     pub fn physical_names(&self, mesh: &Merged) -> String {
-        physical_names(mesh, &self.embedded, self.labels(), self.regions())
+        let groups = self.labels().into_iter().flat_map(|label| self.physical(label));
+        let groups: BTreeSet<u32> = groups.map(|tag| tag - 1).collect();
+        physical_names(mesh, &self.embedded, groups, self.regions())
     }
 
     fn put_bounds(&self, out: &mut Out) {
         self.bounds.iter().flatten().for_each(|&x| out.double(x));
     }
 
-    /// Writes labels and regions as surfaces and volumes: tag, bounds, physical tag, no bounding entities.
+    /// Writes labels and regions as surfaces and volumes: tag, bounds, physical tags, no bounding entities.
     pub fn write_model(&self, out: &mut Out) -> Result<()> {
         let (labels, regions) = (self.labels(), self.regions());
         let curves = self.embedded.edge_labels();
@@ -175,12 +190,14 @@ impl Entities {
             out.int(point.label + 1);
             out.end()?;
         }
-        let curves = curves.into_keys().map(|label| label + 1);
-        for tag in curves.chain(labels.iter().map(|label| label + 1)).chain(regions) {
+        let curves = curves.into_keys().map(|label| (label + 1, vec![label + 1]));
+        let surfaces = labels.iter().map(|&label| (label + 1, self.physical(label)));
+        let volumes = regions.into_iter().map(|region| (region, vec![region]));
+        for (tag, physical) in curves.chain(surfaces).chain(volumes) {
             out.int(tag);
             self.put_bounds(out);
-            out.size(1);
-            out.int(tag);
+            out.size(physical.len() as u64);
+            physical.into_iter().for_each(|tag| out.int(tag));
             out.size(0);
             out.end()?;
         }
@@ -209,31 +226,25 @@ impl Entities {
                 // Faces between partitions lie in a volume; any region will do.
                 Some(other) => {
                     let region = self.regions().first().copied().unwrap_or_default();
-                    self.put(out, [*tag, 3, region], &[*rank, other], None)?;
+                    self.put(out, [*tag, 3, region], &[*rank, other], &[])?;
                 }
-                None => self.put(out, [*tag, 2, label + 1], &[*rank], Some(label + 1))?,
+                None => self.put(out, [*tag, 2, label + 1], &[*rank], &self.physical(*label))?,
             }
         }
         for ((_, tag, _), ((region, rank), _)) in volumes.iter().zip(&self.volumes) {
-            self.put(out, [*tag, 3, *region], &[*rank], Some(*region))?;
+            self.put(out, [*tag, 3, *region], &[*rank], &[*region])?;
         }
         Ok(())
     }
 
-    /// Writes an entity of partitions: its tag, dimension and tag of its parent, ranks, physical group.
-    fn put(
-        &self,
-        out: &mut Out,
-        head: [u32; 3],
-        ranks: &[u32],
-        physical: Option<u32>,
-    ) -> Result<()> {
+    /// Writes an entity of partitions: its tag, dimension and tag of its parent, ranks, physical groups.
+    fn put(&self, out: &mut Out, head: [u32; 3], ranks: &[u32], physical: &[u32]) -> Result<()> {
         head.into_iter().for_each(|n| out.int(n));
         out.size(ranks.len() as u64);
         ranks.iter().for_each(|rank| out.int(rank + 1));
         self.put_bounds(out);
-        out.size(physical.is_some().into());
-        physical.into_iter().for_each(|tag| out.int(tag));
+        out.size(physical.len() as u64);
+        physical.iter().for_each(|&tag| out.int(tag));
         out.size(0);
         out.end()
     }

@@ -159,8 +159,11 @@ fn region_sets(mesh: &mut Merged) -> Result<String> {
 }
 
 fn label_sets(mesh: &Merged) -> String {
-    let labels = mesh.labels().into_iter();
-    sets(labels.map(|(label, name)| (label + 1, name)))
+    let labels = mesh.labels().into_keys();
+    let groups = labels.flat_map(|label| {
+        mesh.label_members(label).into_iter().map(move |member| (label + 1, member))
+    });
+    sets(groups.map(|(attribute, member)| (attribute, mesh.label_name(member))))
 }
 
 /// Named sets of attributes; attributes of one name are one set.

@@ -68,6 +68,9 @@ pub(super) fn partitions(
 /// The lasting id of a point that has none: the midpoint of an edge.
 pub(super) const NO_ID: i64 = -1;
 
+/// Most groups that get a flag for each face. A byte for each is half of a face's bytes then, and the file would be mostly zeros.
+const GROUPS_MAX: usize = 64;
+
 /// A point of the file: its place in the file of the tetrahedra, and its lasting id or -1.
 type PointRow = (u64, i64);
 
@@ -92,7 +95,7 @@ pub(in crate::write) fn write(
         column("global_id", |point: &PointRow| point.1),
     ];
     let cut_of = |face: &MergedFace| face.cut().map(|(cut, _)| cut);
-    let faces = vec![
+    let mut faces = vec![
         column("label", |face: &MergedFace| face.label),
         column("input_id", |face: &MergedFace| or_none(face.triangle())),
         column("region_front", |face: &MergedFace| face.regions[0]),
@@ -102,6 +105,9 @@ pub(in crate::write) fn write(
         column("cut", move |face: &MergedFace| or_none(cut_of(face))),
         column("cut_face", |face: &MergedFace| or_none(face.cut().map(|(_, index)| index))),
     ];
+    for (name, labels) in mesh.overlapping_groups().into_iter().take(GROUPS_MAX) {
+        faces.push(column(name, move |face: &MergedFace| u8::from(labels.contains(&face.label))));
+    }
     let counts = [n_vertices, n_faces, n_corners];
     let texts = ("label_names", &*label_names(mesh));
     let grid = VtkGrid::new(&container, counts, texts, points, faces);

@@ -3,6 +3,7 @@
 //! Every array has its place in the file before the first byte is written, so the arrays are filled side by side.
 //! Source: the VTK file formats document, appended raw data with 64-bit lengths; the VTKHDF file format, version 2.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use crate::write::columns::{Number, TableColumn, put_row};
@@ -22,25 +23,25 @@ enum Group {
 /// An array of the file.
 struct Array {
     group: Group,
-    name: &'static str,
+    name: Cow<'static, str>,
     number: Number,
     components: u64,
 }
 
 impl Array {
     fn of_columns<T>(group: Group, columns: &[TableColumn<T>]) -> impl Iterator<Item = Self> {
-        columns.iter().map(move |&TableColumn { name, number, components, .. }| Self {
+        columns.iter().map(move |column| Self {
             group,
-            name,
-            number,
-            components,
+            name: column.name.clone(),
+            number: column.number,
+            components: column.components,
         })
     }
 
     /// Bytes for each point, cell and partition, where a cell has so many corners.
     fn bytes_per(&self, corners: u64, is_hdf: bool) -> [u64; 3] {
         let bytes = self.components * self.number.bytes();
-        match (self.group, self.name) {
+        match (self.group, &*self.name) {
             (Group::Points | Group::PointData, _) => [bytes, 0, 0],
             (Group::Cells, "connectivity") => [0, corners * bytes, 0],
             // Offsets of each partition begin with a 0.
@@ -115,7 +116,7 @@ impl<P, C> VtkGrid<P, C> {
             (Group::Cells, "offsets", index, 1),
             (Group::Cells, "types", Number::U8, 1),
         ] {
-            arrays.push(Array { group, name, number, components });
+            arrays.push(Array { group, name: name.into(), number, components });
         }
         let bytes_per: Vec<_> = arrays.iter().map(|a| a.bytes_per(corners, is_hdf)).collect();
         let (layout, n_partitions) = match container {
@@ -268,12 +269,12 @@ impl Layout {
             let of_group = arrays.iter().filter(|a| a.group == group);
             of_group
                 .map(|array| {
-                    let (name, rows) = match array.name {
-                        "connectivity" => ("Connectivity", n_cells * corners),
-                        "offsets" => ("Offsets", n_cells + n_partitions),
-                        "types" => ("Types", n_cells),
-                        name if group == Group::CellData => (name, n_cells),
-                        name => (name, n_points),
+                    let (name, rows) = match &*array.name {
+                        "connectivity" => ("Connectivity".into(), n_cells * corners),
+                        "offsets" => ("Offsets".into(), n_cells + n_partitions),
+                        "types" => ("Types".into(), n_cells),
+                        _ if group == Group::CellData => (array.name.clone(), n_cells),
+                        _ => (array.name.clone(), n_points),
                     };
                     let shape = [rows, array.components];
                     let rank = if array.components == 1 { 1 } else { 2 };

@@ -13,6 +13,7 @@ fn set(points: &[[f64; 3]], edges: &[[u32; 2]]) -> EmbeddedSet {
         points: points.iter().map(|&p| Point::from_array(p)).collect(),
         edges: edges.iter().map(|&[a, b]| [a, b, 0]).collect(),
         marks: (0..points.len() as u32).map(|v| [v, 0]).collect(),
+        mark_lines: Vec::new(),
         label_names: vec!["in".to_owned()],
     }
 }

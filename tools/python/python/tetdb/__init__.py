@@ -19,7 +19,7 @@ from ._errors import (
 from ._mesh import Comparison, compare, mesh, open, resume, tetrahedralize
 from ._native import __version__
 from ._options import Event
-from ._sizes import Box, Cylinder, Field, Function, InRegion, Sphere
+from ._sizes import Box, Cylinder, Field, Function, InRegion, NearLabel, Sphere
 from ._store import Chunk, Merged, Quality, Region, Store, Subdomain, SubdomainInfo, Verification
 from ._surface import CheckReport, Defects, Estimate, Surface, sample
 from ._tasks import begin, gather, plan, run_task
@@ -36,6 +36,7 @@ __all__ = [
     "Field",
     "Function",
     "InRegion",
+    "NearLabel",
     "InvalidMesh",
     "Merged",
     "NoRoom",

@@ -38,6 +38,9 @@ _LABELS = {"label": "", "gmsh:physical": "", "medit:ref": ""}
 _REGIONS = {"label": "", "gmsh:physical": "volume_", "medit:ref": "ref_", "region": "region_"}
 """Arrays that name cells, the first that is there, and what is put before their numbers."""
 
+TOGETHER = "\x1f"
+"""Stands between the names of the groups of a cell that is in several."""
+
 Ints = npt.NDArray[np.int64]
 Words = npt.NDArray[np.str_]
 
@@ -73,6 +76,11 @@ def of_mesh(mesh: Any, volume_only: bool = False) -> Cells:
 
 def words_of(labels: Any, n: int, what: str = "labels") -> Words:
     """`n` labels as text."""
+    if isinstance(labels, (list, tuple)) and any(isinstance(one, (list, tuple, set, frozenset)) for one in labels):
+        groups = [sorted(map(str, one)) if isinstance(one, (set, frozenset)) else list(map(str, one)) if isinstance(one, (list, tuple)) else [str(one)] for one in labels]
+        if [] in groups:
+            raise SurfaceError("count-mismatch", "expected one name at least", f"{what}[{groups.index([])}]")
+        labels = [TOGETHER.join(one) for one in groups]
     each = np.asarray(labels)
     if each.dtype.kind == "f" and (each == np.trunc(each)).all():
         each = each.astype(np.int64)
@@ -127,15 +135,23 @@ def _of_meshio(mesh: Any) -> _Mesh:
         if not sets or "label" in mesh.cell_data:
             return found
         words = np.full(sum(sizes), "", object) if found is None else found.astype(object)
-        taken = np.zeros(len(words), bool)
+        dimensions = _TABLE[whole.kinds, 0]
+        taken, n_more = np.zeros(len(words), bool), 0
         for name, rows in sets.items():
             for start, row in zip(np.cumsum([0, *sizes]), rows):
-                at = start + np.asarray(row if row is not None else [], np.int64)
+                at = np.unique(start + np.asarray(row if row is not None else [], np.int64))
+                both = at[taken[at]]
                 words[at[~taken[at]]] = name
                 taken[at] = True
+                is_face = dimensions[both] == 2
+                words[both[is_face]] += TOGETHER + name
+                n_more += int((dimensions[both] == 3).sum())
+        if n_more and dimension == 3:
+            whole.notes.append(f"{n_more} volume cells are in several sets and have the name of the first")
         return words.astype(np.str_)
 
-    return _Mesh(mesh.points, _flat(kinds), _flat(counts), _flat(nodes), named)
+    whole = _Mesh(mesh.points, _flat(kinds), _flat(counts), _flat(nodes), named)
+    return whole
 
 
 def _of_grid(grid: Any) -> _Mesh:
@@ -241,6 +257,7 @@ def _surface_of(mesh: _Mesh, volume_only: bool) -> Cells:
         raise SurfaceError("unsupported-content", f"cells of VTK's type {mesh.kinds[at]} cannot be read", f"cell {at}", "convert them to triangles or polygons")
     numbers = [int((dimensions == d).sum()) for d in range(4)]
     dimension = 3 if volume_only or not numbers[2] else 2
+    names = mesh.named(dimension) if numbers[dimension] else None
     notes = list(mesh.notes)
     if not numbers[dimension]:
         there = ", ".join(f"{n} {word}" for n, word in zip(numbers, ("points", "lines", "surface cells", "volume cells")) if n)
@@ -250,7 +267,6 @@ def _surface_of(mesh: _Mesh, volume_only: bool) -> Cells:
         if d != dimension and numbers[d]:
             notes.append(f"{numbers[d]} {what} were left out; " + ("only the volume cells are read" if dimension == 3 else "only the surface is read"))
     kept = dimensions == dimension
-    names = mesh.named(dimension)
     mesh = _chosen(mesh, kept)
     names = None if names is None else names[kept]
     if (curved := int((mesh.kinds > _CURVED).sum())):

@@ -35,6 +35,8 @@ def mesh(
     embed: Mapping[str, Any] | None = None,
     embed_edges: Mapping[str, Any] | None = None,
     embed_points: Mapping[str, Any] | None = None,
+    snap_embedded: Length | None = None,
+    embed_outside: str = "error",
     refine_surface: bool = False,
     optimize: str = "full",
     subdomains: int | None = None,
@@ -60,7 +62,7 @@ def mesh(
         Wanted, least and greatest edge length inside: in the surface's units, or ``"2%"`` of the diagonal of its box.
     hgrad : float, optional
         Greatest ratio of neighboring edge lengths. Default: 1.3.
-    size : Box, Sphere, Cylinder, InRegion, Field, Function, callable, str, path, or a list of them, optional
+    size : Box, Sphere, Cylinder, InRegion, NearLabel, Field, Function, callable, str, path, or a list of them, optional
         Where edges are shorter. Of everything that applies the least length counts. A callable takes points (k, 3) and returns lengths
         (k,); it is asked once, on a regular grid (see :class:`Function`), and what it said is kept in the store.
     regions : {"parity", "all", "outer", "by-orientation", "seeds", "all-but-holes"}, optional
@@ -74,6 +76,11 @@ def mesh(
         Sheets inside, by name, see :meth:`Surface.embedded`.
     embed_edges, embed_points : dict, optional
         Edges and points inside, by name: files or arrays, see :meth:`Surface.embedded_edges` and :meth:`Surface.embedded_points`.
+    snap_embedded : float or str, optional
+        Moves embedded points and ends of embedded edges that are nearer than this onto the surface or a sheet, and divides its triangles
+        there. A length, or ``"1%"`` of the diagonal.
+    embed_outside : {"error", "skip"}
+        Whether embedded points and edges outside the filled regions are refused, or left out with a note.
     refine_surface : bool
         Whether the surface's triangles are divided first where embedded points lie on them, and until their edges are as short as
         the wanted lengths; no point moves.
@@ -119,7 +126,7 @@ def mesh(
     """
     where = _create(
         surface, path, False, hsiz=hsiz, hmin=hmin, hmax=hmax, hgrad=hgrad, size=size, regions=regions, seeds=seeds, holes=holes,
-        embed=embed, embed_edges=embed_edges, embed_points=embed_points, refine_surface=refine_surface, optimize=optimize, subdomains=subdomains, memory=memory, threads=threads,
+        embed=embed, embed_edges=embed_edges, embed_points=embed_points, snap_embedded=snap_embedded, embed_outside=embed_outside, refine_surface=refine_surface, optimize=optimize, subdomains=subdomains, memory=memory, threads=threads,
         progress=progress, existing=existing, keep_coarse=keep_coarse, verify=verify,
     )  # fmt: skip
     return Store(where, memory=memory, threads=threads)
@@ -133,6 +140,7 @@ def _create(
     embed: Mapping[str, Any] | None = None,
     embed_edges: Mapping[str, Any] | None = None,
     embed_points: Mapping[str, Any] | None = None,
+    snap_embedded: Length | None = None,
     memory: int | str | None = None,
     threads: int | None = None,
     progress: bool | Progress | None = None,
@@ -149,9 +157,9 @@ def _create(
     for name, sheet in (embed or {}).items():
         given = given.embedded(sheet, name)
     for name, edges in (embed_edges or {}).items():
-        given = given.embedded_edges(edges, name, divide)
+        given = given.embedded_edges(edges, name, divide, snap_embedded)
     for name, points in (embed_points or {}).items():
-        given = given.embedded_points(points, name, divide)
+        given = given.embedded_points(points, name, divide, snap_embedded)
     job = _options.job(given.bounds, **shape)
     settings = _options.settings(memory, threads)
     replace = _options.one_of(existing, ("keep", "replace"), "existing") == "replace"

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ._errors import TetdbError
 
-__all__ = ["Box", "Cylinder", "Field", "Function", "InRegion", "Size", "Sphere"]
+__all__ = ["Box", "Cylinder", "Field", "Function", "InRegion", "NearLabel", "Size", "Sphere"]
 
 Length: TypeAlias = Union[float, str]
 """A number in the surface's units, or text such as ``"2%"``: a share of the diagonal of its box."""
@@ -59,6 +59,15 @@ class InRegion:
     h: Length
 
 
+@dataclass(frozen=True)
+class NearLabel:
+    """`h` at most on triangles with a label and up to `distance` from them; from there lengths grow."""
+
+    label: str
+    h: Length
+    distance: Length | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Field:
     """Lengths at the vertices of a background mesh, linear in its tetrahedra; nothing is asked for outside.
@@ -96,7 +105,7 @@ class Function:
 
 
 Size: TypeAlias = Union[
-    Box, Sphere, Cylinder, InRegion, Field, Function, str, "os.PathLike[str]", Callable[..., Any]
+    Box, Sphere, Cylinder, InRegion, NearLabel, Field, Function, str, "os.PathLike[str]", Callable[..., Any]
 ]
 """A shape, a field, a callable, an expression in x, y and z as text, or the path of a ``.sol`` file."""
 
@@ -204,7 +213,7 @@ def words(
     size: Size | Iterable[Size] | None,
 ) -> dict[str, Any]:
     """Sizes as the native half takes them."""
-    out: dict[str, Any] = {"shapes": [], "regions": [], "expression": None, "file": None, "field": None}
+    out: dict[str, Any] = {"shapes": [], "regions": [], "labels": [], "expression": None, "file": None, "field": None}
     for name, value in (("hsiz", hsiz), ("hmin", hmin), ("hmax", hmax)):
         out[name] = None if value is None else length(value, name)
     out["hgrad"] = None if hgrad is None else numbers(hgrad, 1, "hgrad")[0]
@@ -223,6 +232,9 @@ def words(
             out["shapes"].append(_shape(one, where))
         elif isinstance(one, InRegion):
             out["regions"].append((str(one.region), length(one.h, where)))
+        elif isinstance(one, NearLabel):
+            distance = None if one.distance is None else length(one.distance, where)
+            out["labels"].append((str(one.label), length(one.h, where), distance))
         elif isinstance(one, Field):
             only("field", _field(one, where), where)
         elif isinstance(one, os.PathLike):

@@ -290,6 +290,12 @@ class Store:
         return list(self._said()["labels"])
 
     @property
+    def label_sets(self) -> dict[str, list[str]]:
+        """Labels of triangles in several groups, and the labels of those; empty where no triangle is in two."""
+        names, said = self.labels, self._said()["label_sets"]
+        return {names[one["label"]]: [names[m] for m in one["members"]] for one in said}
+
+    @property
     def regions(self) -> list[Region]:
         """Regions by number, those that are not filled among them."""
         labels = self.labels
@@ -439,7 +445,7 @@ class Store:
         inside : bool
             They lie wholly in box and ball.
         subdomains, regions, labels : optional
-            They are in one of these, or stand on input triangles with one of these labels.
+            They are in one of these, or stand on input triangles with one of these labels, or in a group of this name.
         order_by : str, optional
             One of the numbers a condition may name; the greatest first, or the least unless `descending`.
         limit : int, optional

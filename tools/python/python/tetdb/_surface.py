@@ -97,7 +97,7 @@ class Surface:
     triangles : (m, 3) int array
         Positions in `points`, counter-clockwise seen from outside or all the other way.
     labels : (m,) array of str or int, optional
-        The label of each triangle, or of each surface cell of a mesh.
+        The label of each triangle, or of each surface cell of a mesh; a list or tuple of them for one in several groups.
 
     Notes
     -----
@@ -145,7 +145,7 @@ class Surface:
 
     @classmethod
     def read(cls, *files: str | os.PathLike[str]) -> Surface:
-        """Reads files as one surface: STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen; each a label unless it has its own."""
+        """Reads files as one surface: STL, PLY, OBJ, OFF, 3MF, GIFTI, MEDIT, Gmsh, TetGen and others; each a label unless it has its own."""
         return cls._of(_native.Surface.read([os.fspath(f) for f in files]))
 
     @classmethod
@@ -187,9 +187,21 @@ class Surface:
 
     @property
     def labels(self) -> npt.NDArray[np.str_]:
-        """(m,) str: the label of each triangle."""
+        """(m,) str: the label of each triangle; for one in several groups their names with ``+`` between them."""
         names, codes = self._inner.labels()
         return np.array(names, dtype=np.str_)[codes]
+
+    @property
+    def groups(self) -> dict[str, npt.NDArray[np.int64]]:
+        """Numbers of the triangles in each group; one may be in several. ``{name: [rows]}`` of it are cell sets of meshio."""
+        names, codes = self._inner.labels()
+        sets = dict(self._inner.label_sets())
+        found: dict[str, npt.NDArray[np.int64]] = {}
+        for label, name in enumerate(names):
+            if label not in sets:
+                having = [label, *(one for one, members in sets.items() if label in members)]
+                found[name] = np.flatnonzero(np.isin(codes, having))
+        return found
 
     @property
     def notes(self) -> list[str]:
@@ -249,7 +261,7 @@ class Surface:
         both._parts = Surface.embedded, (self, inside, name)
         return both
 
-    def embedded_edges(self, edges: Any, name: str, divide: bool = False) -> Surface:
+    def embedded_edges(self, edges: Any, name: str, divide: bool = False, snap: Length | None = None) -> Surface:
         """The same with edges inside: each is an edge of the mesh, whole and in its place. To be called after :meth:`embedded`.
 
         Parameters
@@ -261,6 +273,8 @@ class Surface:
         divide : bool
             Whether triangles are divided where ends of edges lie exactly on them. Edges otherwise meet them, and each other, in common
             vertices alone.
+        snap : float or str, optional
+            Ends nearer than this to a triangle are moved onto it, and divide it there: a length, or ``"1%"`` of the diagonal.
         """
         _check_name(name)
         if _is_path(edges):
@@ -275,18 +289,18 @@ class Surface:
             given = points, np.ascontiguousarray(pairs, dtype=np.uint32), _words(edges[2:], len(pairs))
         else:
             raise SurfaceError("unsupported-content", f"{type(edges).__name__} is no edges", "edges", "give a path, or points and pairs of them")
-        both = self._of(self._inner.embedded_edges(given, name, bool(divide)))
-        both._parts = Surface.embedded_edges, (self, edges, name, divide)
+        both = self._of(self._inner.embedded_edges(given, name, bool(divide), _within(snap)))
+        both._parts = Surface.embedded_edges, (self, edges, name, divide, snap)
         return both
 
-    def embedded_points(self, points: Any, name: str, divide: bool = False) -> Surface:
+    def embedded_points(self, points: Any, name: str, divide: bool = False, snap: Length | None = None) -> Surface:
         """The same with points inside: each is a vertex of the mesh that is not moved.
 
         Parameters
         ----------
         points : path, array or tuple
             A ``.csv``, ``.node``, ``.obj`` or legacy ``.vtk`` file; or (n, 3); or both of this and n labels.
-        name, divide
+        name, divide, snap
             As of :meth:`embedded_edges`.
         """
         _check_name(name)
@@ -296,8 +310,8 @@ class Surface:
             xyz, *labels = points if isinstance(points, tuple) and len(points) == 2 else (points,)
             xyz = _points_of(xyz)
             given = xyz, _words(labels, len(xyz))
-        both = self._of(self._inner.embedded_points(given, name, bool(divide)))
-        both._parts = Surface.embedded_points, (self, points, name, divide)
+        both = self._of(self._inner.embedded_points(given, name, bool(divide), _within(snap)))
+        both._parts = Surface.embedded_points, (self, points, name, divide, snap)
         return both
 
     def write(self, path: str | os.PathLike[str]) -> None:
@@ -341,7 +355,11 @@ class Surface:
     def __reduce__(self) -> tuple[Any, ...]:
         if self._parts:
             return self._parts
-        return Surface._again, (self.points, self.triangles, self.labels, *self._inner.extras())
+        names, codes = self._inner.labels()
+        for label, members in self._inner.label_sets():
+            names[label] = _cells.TOGETHER.join(names[m] for m in members)
+        words = np.array(names, dtype=np.str_)[codes]
+        return Surface._again, (self.points, self.triangles, words, *self._inner.extras())
 
     def __repr__(self) -> str:
         return f"<tetdb.Surface: {self.n_points} points, {self.n_triangles} triangles>"
@@ -352,6 +370,10 @@ def sample(spec: str) -> Surface:
     if not isinstance(spec, str):
         raise SurfaceError("bad-sample", f"{spec!r} is no text", "spec")
     return Surface._of(_native.Surface.sample(spec))
+
+
+def _within(snap: Length | None) -> tuple[float, bool] | None:
+    return None if snap is None else length(snap, "snap")
 
 
 def _check_name(name: object) -> None:
