@@ -48,6 +48,10 @@ const LONG_FILES: &[(&str, &str)] = &[
 const LONG_FUNCTIONS: &[(&str, &str)] = &[
     ("cli/failure.rs help_of", "a sentence of help for each code"),
     (
+        "kernel/blocks/insert.rs expand",
+        "one tetrahedron of a cavity: its faces share products, and loads come before tests",
+    ),
+    (
         "kernel/boundary/grow.rs grow",
         "a cavity is grown, then refused for any of five reasons that need what was grown",
     ),

@@ -16,7 +16,6 @@ use super::page_table::{
     DIRTY, FRAMES_LIMIT, IN_BASE, IN_OUTPUT, PageTable, REFERENCED, RESIDENT, frame_of,
 };
 use super::{DiskPath, OrRaise, Pages, SharedPages, StorageError, check_cancelled, kind, raise};
-use memory::{frames_of, zeroed};
 
 /// Dirty pages written in one commit; a quarter of redb's cache.
 const BATCH_PAGES_MAX: usize = 256;
@@ -60,6 +59,20 @@ pub struct Pager {
     order: LruCache<u32, ()>,
     files: PageFiles,
     stats: PagerStats,
+}
+
+/// Frames in a pool of `bytes`.
+fn frames_of(bytes: u64) -> usize {
+    usize::try_from(bytes / FRAME_BYTES as u64)
+        .unwrap_or(usize::MAX)
+        .clamp(FRAMES_MIN, FRAMES_LIMIT)
+}
+
+/// Slots of frames, which are there when they are touched.
+fn zeroed(n: usize) -> Vec<Slot> {
+    bytemuck::allocation::try_zeroed_vec(n).unwrap_or_else(|()| {
+        raise(StorageError::NoMemory { bytes: (n * size_of::<Slot>()) as u64 })
+    })
 }
 
 impl Pager {

@@ -1,24 +1,9 @@
 //! How much memory the frames take.
 
-use super::{BATCH_PAGES_MAX, DIRTY, FRAMES_LIMIT, FRAMES_MIN, NO_OWNER, Pager};
+use super::{BATCH_PAGES_MAX, DIRTY, NO_OWNER, Pager, frames_of, zeroed};
 use crate::storage::page_files::{Backing, PageFiles};
 use crate::storage::page_table::PageTable;
-use crate::storage::{StorageError, raise};
-use tetdb_schema::page::{FRAME_BYTES, SLOTS, Slot};
-
-/// Frames in a pool of `bytes`.
-pub(super) fn frames_of(bytes: u64) -> usize {
-    usize::try_from(bytes / FRAME_BYTES as u64)
-        .unwrap_or(usize::MAX)
-        .clamp(FRAMES_MIN, FRAMES_LIMIT)
-}
-
-/// Slots of frames, which are there when they are touched.
-pub(super) fn zeroed(n: usize) -> Vec<Slot> {
-    bytemuck::allocation::try_zeroed_vec(n).unwrap_or_else(|()| {
-        raise(StorageError::NoMemory { bytes: (n * size_of::<Slot>()) as u64 })
-    })
-}
+use tetdb_schema::page::{FRAME_BYTES, SLOTS};
 
 impl Pager {
     /// Limits the frames to `bytes`, which must suffice for the frames in use and cannot exceed the initial size.
