@@ -209,7 +209,7 @@ mod tests {
         let named = CellArrays { names: Some(&["rock"]), ..cells(&[8], &hexahedron) };
         let boundary = Surface::boundary_of_cells(&points, named).unwrap().noted("by hand");
         assert_eq!((boundary.n_triangles(), boundary.labels()), (12, &["rock".to_owned()][..]));
-        assert!(boundary.notes().iter().any(|note| note.contains("1 volume cells")));
+        assert!(boundary.notes().iter().any(|note| note.contains("1 volume cell")));
         assert!(boundary.notes().iter().any(|note| note == "arrays: by hand"));
         let (notes, seeds) = (boundary.notes(), boundary.seeds().to_vec());
         assert_eq!(seeds.len(), 1);

@@ -193,13 +193,13 @@ impl Divider {
             }
             let first = &found[i].1;
             let within = MEAN_WITHIN * f64::from(first.h);
-            for j in i + 1..found.len().min(i + 1 + MEAN_OF) {
-                let point = found[j].1.point;
-                let is_single = self.means[j].1 == 1;
-                if is_single && (point - first.point).length_squared() < within * within {
-                    self.means[j].1 = 0;
-                    self.means[i].0 += point;
-                    self.means[i].1 += 1;
+            let (firsts, others) = self.means.split_at_mut(i + 1);
+            for (mean, (_, other)) in others.iter_mut().zip(&found[i + 1..]).take(MEAN_OF) {
+                let is_near = (other.point - first.point).length_squared() < within * within;
+                if mean.1 == 1 && is_near {
+                    mean.1 = 0;
+                    firsts[i].0 += other.point;
+                    firsts[i].1 += 1;
                 }
             }
         }

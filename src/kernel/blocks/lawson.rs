@@ -283,6 +283,8 @@ impl Spheres {
         }
     }
 
+    // Plain indices become vector instructions.
+    #[allow(clippy::needless_range_loop)]
     #[inline(never)]
     fn compute(&mut self) {
         let c = &self.corners;

@@ -235,6 +235,8 @@ impl Terms {
     }
 
     /// Volume times center, seen from each corner, over the cube of the size.
+    // Plain indices become vector instructions.
+    #[allow(clippy::needless_range_loop)]
     #[inline(never)]
     fn compute(&mut self) {
         let c = &self.corners;

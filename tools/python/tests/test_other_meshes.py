@@ -54,7 +54,7 @@ def test_meshio_polygons_are_cut(recwarn: pytest.WarningsRecorder) -> None:
 def test_meshio_other_cells_are_left_out_with_words() -> None:
     meshio = pytest.importorskip("meshio")
     cells = [("triangle", TRIANGLES), ("line", [[0, 1], [1, 2]]), ("vertex", [[0], [1], [2]]), ("tetra", [[0, 1, 2, 3]])]
-    surface = quiet(meshio.Mesh(TET, cells), "2 lines", "3 vertex cells", "1 volume cells")
+    surface = quiet(meshio.Mesh(TET, cells), "2 lines", "3 vertex cells", "1 volume cell")
     assert surface.n_triangles == 4
     with pytest.warns(UserWarning, match="boundary|surface cells"):
         again = tetdb.Surface.boundary_of(meshio.Mesh(TET, cells))
@@ -82,7 +82,7 @@ def test_volume_cells_give_their_boundary(kind: str, cell: np.ndarray, volume: f
     for one in (mesh, pyvista.from_meshio(mesh)):
         surface = tetdb.Surface(one)
         assert volume_of(surface) == pytest.approx(volume)
-        assert any("the boundary of 1 volume cells" in note for note in surface.notes), surface.notes
+        assert any("the boundary of 1 volume cell" in note for note in surface.notes), surface.notes
 
 
 def test_regions_of_volume_cells_stay_apart(tmp_path: Any) -> None:
