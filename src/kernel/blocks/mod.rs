@@ -167,7 +167,7 @@ impl Run<'_, '_> {
                 self.report.lock().unwrap_or_else(PoisonError::into_inner).operations.add(&counts);
             }
         }
-        let made = visitor.region.check_in();
+        let made = visitor.region.check_in(own);
         self.bricks.put_all(numbers.iter().copied().zip(made));
     }
 
@@ -194,7 +194,7 @@ impl Run<'_, '_> {
         let own = numbers.partition_point(|&b| b < block.bricks.start) as u32;
         let is_own: Vec<bool> = numbers.iter().map(|b| block.bricks.contains(b)).collect();
         self.divide(visitor, &is_own, own);
-        let made = visitor.region.check_in();
+        let made = visitor.region.check_in(own);
         self.bricks.put_all(numbers.iter().copied().zip(made));
     }
 

@@ -201,10 +201,11 @@ impl Region {
         }
     }
 
-    /// Makes bricks of the arrays, in the order of the region's.
-    pub fn check_in(&mut self) -> Vec<Arc<Brick>> {
+    /// Makes bricks of the arrays, in the order of the region's. The one at place `own` gets tetrahedra whose vertices are all outside, which
+    /// flips may make.
+    pub fn check_in(&mut self, own: u32) -> Vec<Arc<Brick>> {
         let mut scratch = std::mem::take(&mut self.scratch);
-        let counts = self.distribute(&mut scratch);
+        let counts = self.distribute(own, &mut scratch);
         let vertices = self.vertices_of_bricks();
         let n_known = self.bricks.len() + self.outside.len();
         scratch.near.clear();
@@ -228,7 +229,7 @@ impl Region {
     }
 
     /// Gives each tetrahedron in use a slot; returns how many slots each brick has.
-    fn distribute(&self, scratch: &mut Scratch) -> Vec<u32> {
+    fn distribute(&self, own: u32, scratch: &mut Scratch) -> Vec<u32> {
         let n = self.bricks.len();
         scratch.to.clear();
         scratch.to.resize(self.mesh.tets.len(), NONE);
@@ -253,7 +254,8 @@ impl Region {
             if !tet.is_live() || scratch.to[t] != NONE {
                 continue;
             }
-            let place = self.home(tet) as usize;
+            let home = self.home(tet);
+            let place = if home == OUTSIDE { own } else { home } as usize;
             while is_taken[place].last() == Some(&next[place]) {
                 is_taken[place].pop();
                 next[place] += 1;
