@@ -265,8 +265,7 @@ fn on_steps_needles_and_caps_what_the_surface_does_not_force_is_mended() -> Outc
     Ok(())
 }
 
-/// A page can be changed so that its checksums are right. A run that reads it reports damage, never a bug of the program;
-/// unless the changed tetrahedron was replaced by others, and the mesh is valid.
+/// A page can be changed so that its checksums are right. A run that reads it reports damage, never a bug of the program.
 #[test]
 fn pages_that_are_no_mesh_are_damage() -> Outcome {
     use redb::{Database, ReadableTable, TableDefinition};
@@ -316,14 +315,8 @@ fn pages_that_are_no_mesh_are_damage() -> Outcome {
             drop(database);
             for threads in [1, 2] {
                 let resumed = Store::resume(&path, Settings::new().threads(threads));
-                let what = format!("word {word} of {kind:?}, {number}");
-                match resumed {
-                    Err(error) => assert_eq!(error.code(), Code::Damaged, "{what}"),
-                    Ok(store) => {
-                        let found = store.verify(VerifyLevel::Delaunay)?;
-                        assert!(found.is_valid(), "{what}: {found:?}");
-                    }
-                }
+                let code = resumed.err().map(|e| e.code());
+                assert_eq!(code, Some(Code::Damaged), "word {word} of {kind:?}, {number}");
             }
         }
     }
