@@ -3,7 +3,7 @@
 use tetdb_schema::page::NONE;
 
 use crate::mesh::{FaceRef, Tet};
-use tetdb_base::geom::Point;
+use tetdb_base::geom::{Point, orient};
 
 /// A vertex in an array or in a brick.
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
@@ -40,6 +40,11 @@ impl Vertex {
     /// Moves a vertex that is not fixed, and changes the length wanted there. A vertex at infinity is gone.
     pub fn set(&mut self, point: Point, h: f32) {
         (self.point, self.h) = (point, h);
+    }
+
+    /// Fixes a vertex.
+    pub fn fix(&mut self) {
+        self.h = -self.h.abs();
     }
 
     /// The same with another note.
@@ -122,6 +127,29 @@ impl FlatMesh {
     #[inline(always)]
     pub fn is_held(&self, t: u32) -> bool {
         self.held[t as usize]
+    }
+
+    /// Whether all tetrahedra are positive and neighbors agree: for assertions.
+    pub fn is_sound(&self) -> bool {
+        let sorted = |mut face: [u32; 3]| {
+            face.sort_unstable();
+            face
+        };
+        let agrees = |t: u32, tet: &Tet, i: usize| {
+            let across = tet.neighbor[i];
+            !across.exists() || {
+                let other = self.tet(across.tet());
+                other.is_live()
+                    && other.neighbor[across.face()] == FaceRef::new(t, i)
+                    && sorted(other.face(across.face())) == sorted(tet.face(i))
+                    && other.is_required(across.face()) == tet.is_required(i)
+            }
+        };
+        let mut live = (0u32..).zip(&self.tets).filter(|(_, tet)| tet.is_live());
+        live.all(|(t, tet)| {
+            let [a, b, c, d] = self.points(tet);
+            orient(a, b, c, d) > 0.0 && (0..4).all(|i| agrees(t, tet, i))
+        })
     }
 
     /// A place for a tetrahedron of the same region as `like`.

@@ -28,6 +28,12 @@ pub(super) fn improve(
     own: u32,
 ) -> OperationCounts {
     free_gaps(&mut region.mesh);
+    // Nobody would learn that a copy moved or is gone: vertices of other bricks stay, even where all their tetrahedra are here.
+    for (vertex, &brick) in region.mesh.vertices.iter_mut().zip(&region.brick_of) {
+        if brick == OUTSIDE {
+            vertex.fix();
+        }
+    }
     let others = not_due(region, is_due);
     let n_vertices = region.mesh.vertices.len();
     point_to_tets(&mut region.mesh);

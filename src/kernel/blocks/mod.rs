@@ -167,6 +167,7 @@ impl Run<'_, '_> {
                 self.report.lock().unwrap_or_else(PoisonError::into_inner).operations.add(&counts);
             }
         }
+        debug_assert!(visitor.region.mesh.is_sound());
         let made = visitor.region.check_in(own);
         self.bricks.put_all(numbers.iter().copied().zip(made));
     }
@@ -194,6 +195,7 @@ impl Run<'_, '_> {
         let own = numbers.partition_point(|&b| b < block.bricks.start) as u32;
         let is_own: Vec<bool> = numbers.iter().map(|b| block.bricks.contains(b)).collect();
         self.divide(visitor, &is_own, own);
+        debug_assert!(visitor.region.mesh.is_sound());
         let made = visitor.region.check_in(own);
         self.bricks.put_all(numbers.iter().copied().zip(made));
     }
