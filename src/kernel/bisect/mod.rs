@@ -56,6 +56,8 @@ pub struct Method {
     pub lengths: Lengths,
     /// Choice of the cutting plane.
     pub plane: PlaneChoice,
+    /// True to saturate an undivided mesh in blocks, which is not finished.
+    pub in_blocks: bool,
 }
 
 /// Parameters of a cut.

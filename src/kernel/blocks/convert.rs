@@ -4,7 +4,7 @@ use tetdb_schema::page::NONE;
 
 use super::brick::{Bricks, SLOT_BITS, SLOT_MASK, Slot};
 use super::flat::Vertex;
-use super::partition::Partition;
+use super::partition::KdPartition;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
 use crate::mesh::{FaceRef, Mesh, dense, sparse};
 use tetdb_base::storage::{Pages, StorageError, raise};
@@ -30,7 +30,7 @@ fn next_slot(counts: &mut [u32], brick: u32) -> Slot {
 }
 
 /// Fills empty bricks with a mesh. Coarse vertices keep their id in their note. Effects: the scratch map is used up.
-pub(super) fn to_bricks<P: Pages>(mesh: &mut Mesh<P>, partition: &Partition, bricks: &Bricks) {
+pub(super) fn to_bricks<P: Pages>(mesh: &mut Mesh<P>, partition: &KdPartition, bricks: &Bricks) {
     let n_vertices = dense(mesh.vertex_ids_end());
     let n_tets = dense(mesh.tet_ids_end());
     mesh.reset_scratch(n_vertices + n_tets, NONE);

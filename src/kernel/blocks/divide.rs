@@ -4,14 +4,13 @@
 //! off: its tetrahedron stays unexamined, for a neighbor that comes later.
 
 use super::insert::{Inserter, Refusal};
-use super::partition::Partition;
-use super::recent::Recent;
+use super::partition::KdPartition;
 use super::region::Region;
 use super::spawn::{Candidate, GOOD, Spawner, center, is_in};
 use crate::mesh::Tet;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{FROZEN, MARK};
-use crate::refine::{Field, RefineReport};
+use crate::refine::{Field, Recent, RefineReport};
 use tetdb_base::geom::{HilbertFrame, Point};
 use tetdb_base::storage::check_cancelled;
 
@@ -44,7 +43,7 @@ impl Divider {
         Self {
             inserter: Inserter::new(),
             spawner: Spawner::default(),
-            recent: Recent::default(),
+            recent: Recent::new(),
             next: Vec::new(),
             second: Vec::new(),
             seen: Vec::new(),
@@ -56,7 +55,7 @@ impl Divider {
     pub fn divide(
         &mut self,
         region: &mut Region,
-        partition: &Partition,
+        partition: &KdPartition,
         field: &Field,
         is_due: &[bool],
         own: u32,
@@ -133,7 +132,7 @@ impl Divider {
     fn insert(
         &mut self,
         region: &mut Region,
-        partition: &Partition,
+        partition: &KdPartition,
         field: &Field,
         own: u32,
         report: &mut RefineReport,
@@ -208,12 +207,14 @@ impl Divider {
     fn try_insert(
         &mut self,
         region: &mut Region,
-        partition: &Partition,
+        partition: &KdPartition,
         field: &Field,
         c: &Candidate,
         own: u32,
     ) -> Result<(), Refusal> {
-        let hint = self.recent.hint(c).ok_or(Refusal::Near)?;
+        let hint = (self.recent)
+            .hint(c.point, c.h, c.tet, |square, h| c.refuses(square, h))
+            .ok_or(Refusal::Near)?;
         let mesh = &mut region.mesh;
         let inserter = &mut self.inserter;
         let mut start = Err(Refusal::Blocked);
@@ -252,7 +253,7 @@ impl Divider {
         let brick = region.bricks.binary_search(&partition.find(c.point));
         let v = region.add_vertex(c.point, c.h, brick.map_or(own, |place| place as u32));
         inserter.fill(&mut region.mesh, v);
-        self.recent.push(c, inserter.new_tets()[0]);
+        self.recent.push(c.point, c.h, inserter.new_tets()[0]);
         Ok(())
     }
 }

@@ -6,7 +6,7 @@ use tetdb_schema::page::{NONE, SLOT_BITS, SLOT_MASK, SLOTS, Slot};
 use tetdb_schema::tree::{IdCounts, MeshState};
 
 use super::flat::{Attribute, EMPTY, FlatMesh, Vertex};
-use super::partition::Partition;
+use super::partition::KdPartition;
 use super::region::{OUTSIDE, Region};
 use super::spawn::is_in;
 use crate::mesh::anatomy::mark::EXAMINED;
@@ -23,7 +23,7 @@ const RECORDS: u32 = tetdb_schema::page::RECORDS as u32;
 /// Improves the tetrahedra of the bricks for which `is_due` holds. `own` is the place of the brick for new vertices outside the region.
 pub(super) fn improve(
     region: &mut Region,
-    partition: &Partition,
+    partition: &KdPartition,
     is_due: &[bool],
     own: u32,
 ) -> OperationCounts {

@@ -71,7 +71,7 @@ pub(super) struct Inserter {
 }
 
 /// End of a walk.
-pub(super) struct Place {
+pub(super) struct WalkEnd {
     pub tet: u32,
     pub record: Tet,
 }
@@ -116,7 +116,7 @@ impl Inserter {
     }
 
     /// The tetrahedron that holds `p`, walking from `hint`.
-    pub fn locate(&mut self, mesh: &FlatMesh, p: Point, hint: u32) -> Result<Place, Refusal> {
+    pub fn locate(&mut self, mesh: &FlatMesh, p: Point, hint: u32) -> Result<WalkEnd, Refusal> {
         let mut tet = hint;
         let mut record = *mesh.tet(tet);
         if !record.is_live() {
@@ -137,7 +137,7 @@ impl Inserter {
             self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             self.random ^= self.random >> 17;
             let Some(i) = exit else {
-                return Ok(Place { tet, record });
+                return Ok(WalkEnd { tet, record });
             };
             let across = record.neighbor[i];
             if !across.exists() {
@@ -160,7 +160,7 @@ impl Inserter {
         &mut self,
         mesh: &mut FlatMesh,
         p: Point,
-        start: &Place,
+        start: &WalkEnd,
         is_near: impl Fn(&FlatMesh, u32, f64) -> bool,
     ) -> Result<(), Refusal> {
         self.cavity.clear();
@@ -353,7 +353,7 @@ impl Inserter {
     }
 
     /// Numbers the vertices of the outer faces; `false` when these make no sphere, or a vertex would lose its last tetrahedron.
-    fn number(&mut self, mesh: &mut FlatMesh, start: &Place) -> bool {
+    fn number(&mut self, mesh: &mut FlatMesh, start: &WalkEnd) -> bool {
         self.turn += 1;
         assert!(self.turn < 1 << (32 - LOCAL_BITS), "a block has fewer candidates");
         let tag = self.turn << LOCAL_BITS;

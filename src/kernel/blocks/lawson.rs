@@ -6,13 +6,12 @@
 use tetdb_schema::page::NONE;
 
 use super::flat::{EMPTY, FlatMesh};
+use super::side_by_side::{Corners, N, reach, reach_of, volume_and_center};
 use crate::mesh::anatomy::mark::{EXAMINED, STAYS};
 use crate::mesh::anatomy::{FACES, MARK, REQUIRED};
 use crate::mesh::{FaceRef, Tet};
-use tetdb_base::geom::{Point, insphere, larger, orient};
+use tetdb_base::geom::{Point, insphere, orient};
 
-/// Tetrahedra whose spheres are found side by side.
-const N: usize = 64;
 /// Tetrahedra tested before the first of their flips. The mesh depends on it.
 const BATCH: usize = 16_384;
 /// Error of the test in units of L⁴ E and of L³ E², with sums of coordinates for L and E: see `optimize/sphere.rs`, whose largest
@@ -27,8 +26,7 @@ pub(super) const ACTIVE: usize = STAYS;
 
 /// Spheres side by side.
 struct Spheres {
-    /// Coordinates of the four corners.
-    corners: [[f64; N]; 12],
+    corners: Corners,
     normal: [[f64; N]; 3],
     det: [f64; N],
     reach: [f64; N],
@@ -51,7 +49,7 @@ pub(super) struct Lawson {
 impl Lawson {
     pub fn new() -> Self {
         let spheres = Spheres {
-            corners: [[0.0; N]; 12],
+            corners: Corners::new(),
             normal: [[0.0; N]; 3],
             det: [0.0; N],
             reach: [0.0; N],
@@ -270,10 +268,7 @@ impl Spheres {
             }
             let at = self.n;
             for (i, vertex) in mesh.corners(tet).into_iter().enumerate() {
-                let [x, y, z] = vertex.point.to_array();
-                self.corners[3 * i][at] = x;
-                self.corners[3 * i + 1][at] = y;
-                self.corners[3 * i + 2][at] = z;
+                self.corners.set(at, i, vertex.point);
                 let across = tet.neighbor[i];
                 self.faces[self.n_faces] = (at as u32, across);
                 self.n_faces += usize::from(!tet.is_required(i) & across.exists());
@@ -283,30 +278,16 @@ impl Spheres {
         }
     }
 
-    // Plain indices become vector instructions.
-    #[allow(clippy::needless_range_loop)]
     #[inline(never)]
     fn compute(&mut self) {
-        let c = &self.corners;
         for k in 0..N {
-            let (ax, ay, az) = (c[0][k], c[1][k], c[2][k]);
-            let (ux, uy, uz) = (c[3][k] - ax, c[4][k] - ay, c[5][k] - az);
-            let (vx, vy, vz) = (c[6][k] - ax, c[7][k] - ay, c[8][k] - az);
-            let (wx, wy, wz) = (c[9][k] - ax, c[10][k] - ay, c[11][k] - az);
-            let (vwx, vwy, vwz) = (vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx);
-            let (wux, wuy, wuz) = (wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux);
-            let (uvx, uvy, uvz) = (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
-            let u = ux * ux + uy * uy + uz * uz;
-            let v = vx * vx + vy * vy + vz * vz;
-            let w = wx * wx + wy * wy + wz * wz;
-            self.normal[0][k] = vwx * u + wux * v + uvx * w;
-            self.normal[1][k] = vwy * u + wuy * v + uvy * w;
-            self.normal[2][k] = vwz * u + wuz * v + uvz * w;
-            self.det[k] = ux * vwx + uy * vwy + uz * vwz;
-            let gu = ux.abs() + uy.abs() + uz.abs();
-            let gv = vx.abs() + vy.abs() + vz.abs();
-            let gw = wx.abs() + wy.abs() + wz.abs();
-            self.reach[k] = larger(larger(gu, gv), gw);
+            let edges = self.corners.edges(k);
+            let (det, normal) = volume_and_center(edges);
+            self.det[k] = det;
+            self.normal[0][k] = normal.x;
+            self.normal[1][k] = normal.y;
+            self.normal[2][k] = normal.z;
+            self.reach[k] = reach_of(edges);
         }
     }
 
@@ -321,12 +302,10 @@ impl Spheres {
                 continue;
             }
             let q = mesh.point(other.vertex(across.face()));
-            let (x, y, z) =
-                (q.x - self.corners[0][k], q.y - self.corners[1][k], q.z - self.corners[2][k]);
-            let along = x * self.normal[0][k] + y * self.normal[1][k] + z * self.normal[2][k];
-            let power = (x * x + y * y + z * z) * self.det[k] - along;
-            let l = self.reach[k];
-            let m = x.abs() + y.abs() + z.abs();
+            let from = q - self.corners.corner(k, 0);
+            let normal = Point::new(self.normal[0][k], self.normal[1][k], self.normal[2][k]);
+            let power = from.dot(from) * self.det[k] - from.dot(normal);
+            let (l, m) = (self.reach[k], reach(from));
             let bound = l * l * l * m * (BOUND_CORNERS * l + BOUND_POINT * m);
             let is_sure =
                 power.abs() > bound && DIFFERENCES.contains(&l) && DIFFERENCES.contains(&m);

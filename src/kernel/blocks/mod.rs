@@ -17,9 +17,9 @@ mod insert;
 mod lawson;
 mod load;
 mod partition;
-mod recent;
 mod region;
 mod scaffold;
+mod side_by_side;
 mod smooth;
 mod spawn;
 mod tasks;
@@ -32,7 +32,7 @@ use crate::optimize::{Mode, OperationCounts};
 use crate::refine::{Field, RefineReport};
 use brick::Bricks;
 use divide::Divider;
-use partition::Partition;
+use partition::KdPartition;
 use region::Region;
 use smooth::Smoother;
 use tasks::Graph;
@@ -43,7 +43,7 @@ const DIVIDE: usize = 0;
 
 /// What was done.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Report {
+pub struct BlockReport {
     /// Points tried and inserted.
     pub refine: RefineReport,
     /// Operations on bad tetrahedra.
@@ -63,9 +63,9 @@ pub fn saturate<P: Pages>(
     mode: Mode,
     dir: &DiskPath,
     progress: &mut dyn FnMut(u64),
-) -> Report {
+) -> BlockReport {
     let scaffold = scaffold::build(mesh, field);
-    let partition = Partition::new(samples(mesh, field), field.bounds, field.h);
+    let partition = KdPartition::new(samples(mesh, field), field.bounds, field.h);
     let n_bricks = partition.n_bricks();
     let memory = Memory::of(mesh, &partition);
     let bricks = Bricks::new(n_bricks, memory.bricks / 2, Some(dir.clone()));
@@ -75,30 +75,30 @@ pub fn saturate<P: Pages>(
     bricks.limit(memory.bricks);
     mesh.pages_mut().use_at_most(memory.pages);
     let graph = Graph::new(&partition, if mode == Mode::None { 1 } else { 2 });
-    let run = Run {
+    let visits = Visits {
         partition: &partition,
         field,
         mode,
         bricks,
-        report: Mutex::new(Report {
+        report: Mutex::new(BlockReport {
             refine: RefineReport { inserted: scaffold, ..RefineReport::default() },
-            ..Report::default()
+            ..BlockReport::default()
         }),
         inserted: AtomicU64::new(scaffold),
     };
     let visit = |visitor: &mut Visitor, task| {
         let (phase, block) = graph.visit(task);
-        run.visit(visitor, phase, block);
+        visits.visit(visitor, phase, block);
     };
     graph.run(memory.threads, &Visitor::new, &visit, &mut || {
-        progress(run.inserted.load(Ordering::Relaxed))
+        progress(visits.inserted.load(Ordering::Relaxed))
     });
-    run.finish_rest();
-    run.bricks.limit(memory.bricks / 2);
+    visits.finish_rest();
+    visits.bricks.limit(memory.bricks / 2);
     mesh.pages_mut().use_at_most(memory.pages_at_first);
-    let over_constrained = convert::to_pages(&run.bricks, n_bricks as u32, mesh);
+    let over_constrained = convert::to_pages(&visits.bricks, n_bricks as u32, mesh);
     mesh.pages_mut().use_at_most(u64::MAX);
-    let mut report = run.report.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let mut report = visits.report.into_inner().unwrap_or_else(PoisonError::into_inner);
     if !field.place.is_partial() {
         report.refine.over_constrained = over_constrained;
     }
@@ -120,12 +120,12 @@ fn samples<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<load::Sample> {
 }
 
 /// All that visits share.
-struct Run<'a, 'b> {
-    partition: &'a Partition,
+struct Visits<'a, 'b> {
+    partition: &'a KdPartition,
     field: &'a Field<'b>,
     mode: Mode,
     bricks: Bricks,
-    report: Mutex<Report>,
+    report: Mutex<BlockReport>,
     inserted: AtomicU64,
 }
 
@@ -142,7 +142,7 @@ impl Visitor {
     }
 }
 
-impl Run<'_, '_> {
+impl Visits<'_, '_> {
     fn visit(&self, visitor: &mut Visitor, phase: usize, id: usize) {
         let block = &self.partition.blocks[id];
         let numbers = &block.regions[phase];
@@ -229,7 +229,7 @@ const TET_BYTES: u64 = 50;
 
 impl Memory {
     /// Divides what the pages may use.
-    fn of<P: Pages>(mesh: &Mesh<P>, partition: &Partition) -> Self {
+    fn of<P: Pages>(mesh: &Mesh<P>, partition: &KdPartition) -> Self {
         let threads = spare_threads();
         let Some([used, most]) = mesh.pages().bytes_used() else {
             return Self { bricks: usize::MAX, pages: u64::MAX, pages_at_first: u64::MAX, threads };

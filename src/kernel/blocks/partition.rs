@@ -57,7 +57,7 @@ pub(super) struct Block {
 
 /// The partition.
 #[derive(Debug)]
-pub(super) struct Partition {
+pub(super) struct KdPartition {
     branches: Vec<Branch>,
     root: Node,
     /// Boxes of the bricks, and the wanted length in the middle of each.
@@ -69,7 +69,7 @@ pub(super) struct Partition {
     pub blocks: Vec<Block>,
 }
 
-impl Partition {
+impl KdPartition {
     /// Divides samples of the load, whose weights are tetrahedra, in `bounds`. `h` is the wanted length at a point.
     pub fn new(mut samples: Vec<Sample>, bounds: Aabb, h: &(dyn Fn(Point) -> f64 + Sync)) -> Self {
         let total: f64 = samples.iter().map(|s| f64::from(s.weight)).sum();

@@ -6,6 +6,7 @@
 use super::flat::FlatMesh;
 use super::lawson::{ACTIVE, Lawson};
 use super::region::Region;
+use super::side_by_side::{Corners, N, reach, volume_and_center};
 use crate::mesh::anatomy::FACES;
 use tetdb_base::geom::{Point, orient};
 
@@ -17,8 +18,6 @@ const SWEEPS_MAX: u32 = 5;
 const RESTLESS: f64 = 0.02;
 /// Longest move in units of h.
 const MOVE_MAX: f64 = 0.3;
-/// Tetrahedra whose terms are found side by side.
-const N: usize = 64;
 /// Error of a volume in units of the product of three sums of coordinates: 8 roundings of 2⁻⁵³, ten times.
 const VOLUME_BOUND: f64 = 1e-14;
 /// Volumes below may have underflowed on the way.
@@ -39,7 +38,7 @@ pub(super) struct Smoother {
 }
 
 struct Terms {
-    corners: [[f64; N]; 12],
+    corners: Corners,
     sizes: [f64; N],
     centers: [[f64; N]; 12],
     weights: [f64; N],
@@ -49,7 +48,7 @@ struct Terms {
 impl Smoother {
     pub fn new() -> Self {
         let terms = Terms {
-            corners: [[0.0; N]; 12],
+            corners: Corners::new(),
             sizes: [1.0; N],
             centers: [[0.0; N]; 12],
             weights: [0.0; N],
@@ -223,10 +222,7 @@ impl Terms {
             let tet = mesh.tet(t);
             let mut sizes = 0.0;
             for (i, vertex) in mesh.corners(tet).into_iter().enumerate() {
-                let [x, y, z] = vertex.point.to_array();
-                self.corners[3 * i][k] = x;
-                self.corners[3 * i + 1][k] = y;
-                self.corners[3 * i + 2][k] = z;
+                self.corners.set(k, i, vertex.point);
                 sizes += f64::from(vertex.h());
             }
             self.sizes[k] = sizes;
@@ -235,55 +231,34 @@ impl Terms {
     }
 
     /// Volume times center, seen from each corner, over the cube of the size.
-    // Plain indices become vector instructions.
-    #[allow(clippy::needless_range_loop)]
     #[inline(never)]
     fn compute(&mut self) {
-        let c = &self.corners;
         for k in 0..N {
             let size = self.sizes[k];
             let weight = if size > 0.0 { 64.0 / (size * size * size) } else { 1.0 };
-            let (ax, ay, az) = (c[0][k], c[1][k], c[2][k]);
-            let (ux, uy, uz) = (c[3][k] - ax, c[4][k] - ay, c[5][k] - az);
-            let (vx, vy, vz) = (c[6][k] - ax, c[7][k] - ay, c[8][k] - az);
-            let (wx, wy, wz) = (c[9][k] - ax, c[10][k] - ay, c[11][k] - az);
-            let (vwx, vwy, vwz) = (vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx);
-            let (wux, wuy, wuz) = (wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux);
-            let (uvx, uvy, uvz) = (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
-            let u = ux * ux + uy * uy + uz * uz;
-            let v = vx * vx + vy * vy + vz * vz;
-            let w = wx * wx + wy * wy + wz * wz;
-            let det = (ux * vwx + uy * vwy + uz * vwz) * weight;
-            let two = det * 2.0;
-            let x = (vwx * u + wux * v + uvx * w) * weight;
-            let y = (vwy * u + wuy * v + uvy * w) * weight;
-            let z = (vwz * u + wuz * v + uvz * w) * weight;
+            let edges = self.corners.edges(k);
+            let (det, center) = volume_and_center(edges);
+            let (det, center) = (det * weight, center * weight);
             self.weights[k] = det;
-            let o = &mut self.centers;
-            (o[0][k], o[1][k], o[2][k]) = (x, y, z);
             // Seen from another corner, the center is nearer by that corner's position.
-            (o[3][k], o[4][k], o[5][k]) = (x - ux * two, y - uy * two, z - uz * two);
-            (o[6][k], o[7][k], o[8][k]) = (x - vx * two, y - vy * two, z - vz * two);
-            (o[9][k], o[10][k], o[11][k]) = (x - wx * two, y - wy * two, z - wz * two);
+            let [u, v, w] = edges.map(|edge| center - edge * (2.0 * det));
+            for (i, own) in [center, u, v, w].into_iter().enumerate() {
+                self.centers[3 * i][k] = own.x;
+                self.centers[3 * i + 1][k] = own.y;
+                self.centers[3 * i + 2][k] = own.z;
+            }
         }
     }
 
     /// Whether doubles leave it open that a tetrahedron is positive.
     #[inline(never)]
     fn volumes(&self) -> [bool; N] {
-        let c = &self.corners;
         let mut doubtful = [false; N];
         for (k, doubtful) in doubtful.iter_mut().enumerate() {
-            let (ax, ay, az) = (c[0][k], c[1][k], c[2][k]);
-            let (ux, uy, uz) = (c[3][k] - ax, c[4][k] - ay, c[5][k] - az);
-            let (vx, vy, vz) = (c[6][k] - ax, c[7][k] - ay, c[8][k] - az);
-            let (wx, wy, wz) = (c[9][k] - ax, c[10][k] - ay, c[11][k] - az);
-            let (vwx, vwy, vwz) = (vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx);
-            let det = ux * vwx + uy * vwy + uz * vwz;
-            let gu = ux.abs() + uy.abs() + uz.abs();
-            let gv = vx.abs() + vy.abs() + vz.abs();
-            let gw = wx.abs() + wy.abs() + wz.abs();
-            *doubtful = det.is_nan() | (det <= VOLUME_BOUND * gu * gv * gw + VOLUME_MIN);
+            let [u, v, w] = self.corners.edges(k);
+            let det = u.dot(v.cross(w));
+            let bound = VOLUME_BOUND * reach(u) * reach(v) * reach(w) + VOLUME_MIN;
+            *doubtful = det.is_nan() | (det <= bound);
         }
         doubtful
     }

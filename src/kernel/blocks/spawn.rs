@@ -6,6 +6,7 @@
 
 use super::flat::FlatMesh;
 use super::region::{OUTSIDE, Region};
+use super::side_by_side::volume_and_center;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{FACES, MARK};
 use crate::mesh::{End, Tet};
@@ -155,10 +156,8 @@ impl Spawner {
 
 /// The circumcenter seen from the first corner; `None` if doubles know no volume.
 pub(super) fn center([a, b, c, d]: [Point; 4]) -> Option<Point> {
-    let (u, v, w) = (b - a, c - a, d - a);
-    let (vw, wu, uv) = (v.cross(w), w.cross(u), u.cross(v));
-    let det = u.dot(vw);
-    let center = (vw * u.dot(u) + wu * v.dot(v) + uv * w.dot(w)) * (0.5 / det);
+    let (det, center) = volume_and_center([b - a, c - a, d - a]);
+    let center = center * (0.5 / det);
     (det > 0.0 && center.is_finite()).then_some(center)
 }
 

@@ -7,7 +7,7 @@
 use std::collections::BinaryHeap;
 use std::sync::{Condvar, Mutex, PoisonError};
 
-use super::partition::Partition;
+use super::partition::KdPartition;
 use tetdb_base::storage::{check_cancelled, in_place_scope};
 
 /// The graph of all visits; task `phase * n + block` for `n` blocks.
@@ -23,7 +23,7 @@ pub(super) struct Graph {
 
 impl Graph {
     /// `n_phases` one after the other, with the margins in that order.
-    pub fn new(partition: &Partition, n_phases: usize) -> Self {
+    pub fn new(partition: &KdPartition, n_phases: usize) -> Self {
         let n = partition.blocks.len();
         let mut followers = vec![Vec::new(); n * n_phases];
         let mut n_before = vec![0; n * n_phases];
@@ -53,7 +53,7 @@ impl Graph {
         graph
     }
 
-    fn find_urgency(&mut self, partition: &Partition, n_phases: usize) {
+    fn find_urgency(&mut self, partition: &KdPartition, n_phases: usize) {
         let n = self.n_blocks;
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by_key(|&b| partition.blocks[b].color);
@@ -87,7 +87,7 @@ impl Graph {
     ) {
         let n_threads = threads.min(self.n_blocks);
         let ready = (0..self.n_tasks()).filter(|&t| self.n_before[t] == 0);
-        let state = State {
+        let state = TaskState {
             before: self.n_before.clone(),
             ready: ready.map(|t| self.rank(t)).collect(),
             done: 0,
@@ -121,7 +121,7 @@ impl Graph {
     }
 }
 
-struct State {
+struct TaskState {
     before: Vec<u32>,
     /// Tasks to do, the most urgent first.
     ready: BinaryHeap<(u64, std::cmp::Reverse<usize>)>,
@@ -132,7 +132,7 @@ struct State {
 
 struct Queue<'a> {
     graph: &'a Graph,
-    state: Mutex<State>,
+    state: Mutex<TaskState>,
     changed: Condvar,
 }
 

@@ -24,7 +24,7 @@ impl Worker {
         c: &Candidate,
         report: &mut RefineReport,
     ) {
-        let Some(hint) = self.recent.hint(c) else {
+        let Some(hint) = self.recent.hint(c.point, c.h, c.tet, |d, h| refuses(d, h, c)) else {
             report.near += 1;
             return;
         };
@@ -71,7 +71,7 @@ impl Worker {
         }
         self.put_in(mesh, c.point, c.h, region);
         report.inserted += 1;
-        self.recent.push(c, self.last);
+        self.recent.push(c.point, c.h, self.last);
     }
 
     /// Replaces the gathered cavity, which lies in `region`, by the ball of a new vertex; returns that.

@@ -38,7 +38,7 @@ use edge_cache::EdgeCache;
 pub use field::{Field, Lengths};
 pub use graft::{PATTERN_BYTES, find_pattern};
 pub use placement::{Everywhere, PlacementRule};
-use recent::Recent;
+pub(crate) use recent::Recent;
 pub use report::RefineReport;
 use worker::Worker;
 

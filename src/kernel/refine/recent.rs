@@ -9,7 +9,7 @@ const RECENT: usize = 32;
 
 /// The last points inserted. Candidates come along the curve, so what refuses one is often among them, and else the nearest of
 /// them is a good place to start the walk: comparing costs a fiftieth of walking from the divided edge, which is long gone.
-pub(super) struct Recent {
+pub(crate) struct Recent {
     points: [(Point, f32); RECENT],
     /// A tetrahedron of each.
     tets: [u32; RECENT],
@@ -25,25 +25,38 @@ impl Recent {
         self.n = 0;
     }
 
-    pub fn push(&mut self, c: &Candidate, tet: u32) {
-        self.points[self.n % RECENT] = (c.point, c.h);
+    /// Adds a point that was inserted, its wanted length and a tetrahedron of it.
+    pub fn push(&mut self, point: Point, h: f32, tet: u32) {
+        self.points[self.n % RECENT] = (point, h);
         self.tets[self.n % RECENT] = tet;
         self.n += 1;
     }
 
-    /// Where to start the walk to `c`; none when one of the points is nearer than wanted.
-    pub fn hint(&self, c: &Candidate) -> Option<u32> {
-        let (mut nearest, mut at) = (NEAR_START * f64::from(c.h) * f64::from(c.h), usize::MAX);
+    /// A tetrahedron of the last one.
+    pub fn last(&self) -> Option<u32> {
+        Some(self.tets[self.n.checked_sub(1)? % RECENT])
+    }
+
+    /// Where to start the walk to a point of wanted length `h`: at `tet` or at one of the last. None when `refuses` says of one of these, given the
+    /// square of its distance and its length, that it is too near.
+    pub fn hint(
+        &self,
+        point: Point,
+        h: f32,
+        tet: u32,
+        refuses: impl Fn(f64, f32) -> bool,
+    ) -> Option<u32> {
+        let (mut nearest, mut at) = (NEAR_START * f64::from(h) * f64::from(h), usize::MAX);
         for (k, &(q, h)) in self.points[..self.n.min(RECENT)].iter().enumerate() {
-            let squared = (q - c.point).length_squared();
+            let squared = (q - point).length_squared();
             if squared < nearest {
-                if refuses(squared, h, c) {
+                if refuses(squared, h) {
                     return None;
                 }
                 (nearest, at) = (squared, k);
             }
         }
-        Some(self.tets.get(at).copied().unwrap_or(c.tet))
+        Some(self.tets.get(at).copied().unwrap_or(tet))
     }
 }
 

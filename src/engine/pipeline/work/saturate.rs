@@ -13,9 +13,6 @@ use tetdb_kernel::optimize::{self, Mode, OptimizeReport};
 use tetdb_kernel::refine::{Everywhere, Field, Lengths, PlacementRule, RefineReport, saturate};
 use tetdb_kernel::sizing::SizeField;
 
-/// Environment variable that switches to the kernel in blocks, which is not finished.
-const IN_BLOCKS: &str = "TETDB_BLOCKS";
-
 /// Report of the fine step.
 #[derive(Clone, Debug)]
 pub struct FineReport {
@@ -51,8 +48,8 @@ pub fn saturate_and_optimize<P: Pages>(
         watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
     };
     // Zones are not refined in blocks yet. What lies beside one is divided as the zone was, else the interface could be seen.
-    let in_blocks = std::env::var_os(IN_BLOCKS).is_some() && zones.is_empty();
-    if in_blocks && common.method.lengths == Lengths::Field {
+    let method = common.method;
+    if method.in_blocks && zones.is_empty() && method.lengths == Lengths::Field {
         let told = &mut |inserted| told(inserted);
         let report = blocks::saturate(mesh, &wanted, common.mode, space.dir, told);
         let refined = clock.elapsed().as_secs_f64();
