@@ -33,7 +33,9 @@ fn made(surface: &Surface, mesh: &MeshOptions, in_blocks: bool, plan: Option<Pla
         Options { mesh: mesh.clone(), run: RunOptions { method, trial, ..RunOptions::default() } };
     let budget = Budget::new(256 << 20);
     let mut catalog = Catalog::create(&path, &Job::default()).expect("an empty place");
-    pipeline::mesh(&mut catalog, surface, &options, &budget, &silent).expect("a sample meshes");
+    let summary = pipeline::mesh(&mut catalog, surface, &options, &budget, &silent);
+    let fine = summary.expect("a sample meshes").fine;
+    assert!(fine.values().all(|fine| fine.refine.unexamined == 0), "{fine:?}");
     catalog.close().expect("room on the disk");
     let mut store = Catalog::open(&path).expect("what was just written");
     let row = store.subdomains().expect("sealed rows").remove(0);

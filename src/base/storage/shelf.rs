@@ -231,7 +231,8 @@ mod tests {
                 assert_eq!(*shelf.get(k), content(k, turn));
             }
         }
-        let (bytes, units) = (shelf.lock().bytes, shelf.lock().end);
+        let bytes = shelf.lock().bytes;
+        let units = shelf.lock().end;
         assert!(
             bytes <= 20_000 && units * UNIT > 100_000,
             "{bytes} in memory, {units} in the file"

@@ -213,9 +213,8 @@ pub enum VolumePoints {
 }
 
 impl NoteKind {
-    /// A count, and a sentence about it for [`counted`].
-    fn sentence(&self) -> Option<(u64, &'static str)> {
-        Some(match self {
+    fn text(&self) -> String {
+        let (n, sentence) = match self {
             Self::WeldedVertices { n } => (
                 *n,
                 "[vertex repeats|vertices repeat] the coordinates of another and [was|were] joined to it",
@@ -251,8 +250,39 @@ impl NoteKind {
                 *n,
                 "[polygon of two corners is an edge|polygons of two corners are edges], embedded where the surface is meshed",
             ),
-            _ => return None,
-        })
+            Self::MissingEndsolid { line } => {
+                return format!(
+                    "the text ends at line {line} without `endsolid`; all facets were read"
+                );
+            }
+            Self::SkippedElements { what, n } => {
+                let (words, was) = if *n == 1 { ("of the ", "was") } else { ("", "were") };
+                return format!("{n} {words}{what} {was} left out; only the surface is read");
+            }
+            Self::VolumePoints { points: VolumePoints::Holes, n } => {
+                return format!(
+                    "hole points ({n}) leave their regions empty, unless another rule fills regions"
+                );
+            }
+            Self::VolumePoints { points: VolumePoints::Regions, n } => {
+                return format!(
+                    "regions of the file ({n}) are filled and named so, unless another rule fills regions"
+                );
+            }
+            Self::BoundaryOfCells { n } => {
+                let cells = counted(*n, "volume [cell|cells]");
+                return format!(
+                    "the boundary of {cells}, and faces between regions, are the surface"
+                );
+            }
+            Self::OtherGroups { names } => {
+                return format!(
+                    "volumes of the groups {names} belong to another group before, and have its name"
+                );
+            }
+            Self::Said(text) => return text.clone(),
+        };
+        counted(n, sentence)
     }
 }
 
@@ -261,35 +291,6 @@ impl fmt::Display for Note {
         if !self.file.is_empty() {
             write!(f, "{}: ", self.file)?;
         }
-        if let Some((n, sentence)) = self.kind.sentence() {
-            return f.write_str(&counted(n, sentence));
-        }
-        match &self.kind {
-            NoteKind::MissingEndsolid { line } => {
-                write!(f, "the text ends at line {line} without `endsolid`; all facets were read")
-            }
-            NoteKind::SkippedElements { what, n } => {
-                let words = if *n == 1 { "of the " } else { "" };
-                let was = if *n == 1 { "was" } else { "were" };
-                write!(f, "{n} {words}{what} {was} left out; only the surface is read")
-            }
-            NoteKind::VolumePoints { points, n } => {
-                let (what, use_of) = match points {
-                    VolumePoints::Holes => ("hole points", "leave their regions empty"),
-                    VolumePoints::Regions => ("regions of the file", "are filled and named so"),
-                };
-                write!(f, "{what} ({n}) {use_of}, unless another rule fills regions")
-            }
-            NoteKind::BoundaryOfCells { n } => {
-                let cells = counted(*n, "volume [cell|cells]");
-                write!(f, "the boundary of {cells}, and faces between regions, are the surface")
-            }
-            NoteKind::OtherGroups { names } => write!(
-                f,
-                "volumes of the groups {names} belong to another group before, and have its name"
-            ),
-            NoteKind::Said(text) => f.write_str(text),
-            _ => Ok(()),
-        }
+        f.write_str(&self.kind.text())
     }
 }

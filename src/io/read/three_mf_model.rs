@@ -71,9 +71,9 @@ pub(super) struct Object {
 pub(super) struct Model {
     pub unit: String,
     pub objects: BTreeMap<u32, Object>,
-    /// What the build places.
+    /// Objects in their places, which together are the surface.
     pub items: Vec<Placed>,
-    /// ObjectContent that is not read, in words.
+    /// Kinds of content that are not read.
     pub left_out: BTreeSet<String>,
 }
 

@@ -100,7 +100,7 @@ impl Brick {
         (at as u32) << SLOT_BITS | to.slot
     }
 
-    /// What a reference stands for.
+    /// The slot that a reference names.
     #[inline(always)]
     pub fn resolve(&self, reference: u32) -> Slot {
         let brick = self.near[(reference >> SLOT_BITS) as usize];

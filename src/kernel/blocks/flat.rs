@@ -52,7 +52,7 @@ impl Vertex {
         Self { note, ..self }
     }
 
-    /// Whether the vertex never moves.
+    /// Returns true if the vertex never moves.
     #[inline(always)]
     pub fn is_fixed(&self) -> bool {
         self.h.is_sign_negative()
@@ -123,7 +123,7 @@ impl FlatMesh {
         self.tet(face.tet()).vertex(face.face())
     }
 
-    /// Whether nothing may replace the tetrahedron.
+    /// Returns true if the tetrahedron is held.
     #[inline(always)]
     pub fn is_held(&self, t: u32) -> bool {
         self.held[t as usize]

@@ -5,8 +5,8 @@
 //! 3. `tasks`: each block is visited twice, to be divided and to be smoothed. A visit checks the block and a margin out into plain
 //!    arrays (`region`), works there (`divide`, `smooth`), and checks it in again.
 //!
-//! What a visit sees and does follows from the partition and from the visits before it, whose order is fixed. So the mesh depends neither on
-//! threads nor on memory.
+//! Each visit depends on the partition and on earlier visits alone, and their order is fixed. So the mesh depends neither on threads nor
+//! on memory.
 
 mod brick;
 mod convert;
@@ -41,7 +41,7 @@ use tetdb_base::storage::{DiskPath, Pages, spare_threads};
 /// The first of two visits of a block; the second smooths and improves it. Each has the margin in that place of `MARGINS`.
 const DIVIDE: usize = 0;
 
-/// What was done.
+/// Counts of one saturation in blocks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BlockReport {
     /// Points tried and inserted.
@@ -53,10 +53,11 @@ pub struct BlockReport {
 /// Margins for what was put off by all blocks, in wanted lengths.
 const WIDER_MARGINS: [f64; 3] = [8.0, 24.0, 80.0];
 
-/// Divides edges until the mesh is saturated, and smooths it.
+/// Divides tetrahedra until the mesh is saturated; smooths it unless `mode` is `None`, and improves bad tetrahedra if it is `Full`.
 ///
-/// The mesh must hold filled regions only, sizes set at all its vertices. Effects: new vertices and tetrahedra; ids of tetrahedra change,
-/// those of vertices stay; `tet_of` is not kept up. Errors: unwinds with those of the disk.
+/// The mesh must hold filled regions only, sizes set at all its vertices. `dir` takes bricks that leave memory. `progress` receives the
+/// number of vertices inserted so far. Effects: new vertices and tetrahedra; ids of tetrahedra change, those of vertices stay; `tet_of` is
+/// not kept up. Unwinds with errors of the disk.
 pub fn saturate<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &Field,
@@ -93,12 +94,13 @@ pub fn saturate<P: Pages>(
     graph.run(memory.threads, &Visitor::new, &visit, &mut || {
         progress(visits.inserted.load(Ordering::Relaxed))
     });
-    visits.finish_rest();
+    let unexamined = visits.finish_rest();
     visits.bricks.limit(memory.bricks / 2);
     mesh.pages_mut().use_at_most(memory.pages_at_first);
     let over_constrained = convert::to_pages(&visits.bricks, n_bricks as u32, mesh);
     mesh.pages_mut().use_at_most(u64::MAX);
     let mut report = visits.report.into_inner().unwrap_or_else(PoisonError::into_inner);
+    report.refine.unexamined = unexamined;
     if !field.place.is_partial() {
         report.refine.over_constrained = over_constrained;
     }
@@ -146,62 +148,63 @@ impl Visits<'_, '_> {
     fn visit(&self, visitor: &mut Visitor, phase: usize, id: usize) {
         let block = &self.partition.blocks[id];
         let numbers = &block.regions[phase];
-        let region = &mut visitor.region;
-        region.check_out(numbers, self.bricks.get_all(numbers), &mut |n| self.bricks.get(n));
-        let own = numbers.partition_point(|&b| b < block.bricks.start) as u32;
-        let is_own: Vec<bool> = numbers.iter().map(|b| block.bricks.contains(b)).collect();
-        let color = |b: u32| self.partition.blocks[self.partition.owner(b) as usize].color;
-        // What a block could not do, for want of margin, those do that come later.
-        let is_due: Vec<bool> = (numbers.iter().zip(&is_own))
-            .map(|(&b, &is_own)| is_own || color(b) < block.color)
-            .collect();
-        if phase == DIVIDE {
-            self.divide(visitor, &is_due, own);
-        } else {
-            if self.has_unexamined(block) {
-                self.divide(visitor, &is_own, own);
+        self.within(visitor, block, numbers, |visitor, is_own, own| {
+            let color = |b: u32| self.partition.blocks[self.partition.owner(b) as usize].color;
+            // What a block could not do, for want of margin, those do that come later.
+            let is_due: Vec<bool> = (numbers.iter().zip(is_own))
+                .map(|(&b, &is_own)| is_own || color(b) < block.color)
+                .collect();
+            if phase == DIVIDE {
+                self.divide(visitor, &is_due, own);
+                return;
             }
-            visitor.smoother.smooth(&mut visitor.region, &is_own);
+            if self.n_unexamined(block) > 0 {
+                self.divide(visitor, is_own, own);
+            }
+            visitor.smoother.smooth(&mut visitor.region, is_own);
             if self.mode == Mode::Full {
                 let counts = improve::improve(&mut visitor.region, self.partition, &is_due, own);
                 self.report.lock().unwrap_or_else(PoisonError::into_inner).operations.add(&counts);
             }
-        }
-        debug_assert!(visitor.region.mesh.is_sound());
-        let made = visitor.region.check_in(own);
-        self.bricks.put_all(numbers.iter().copied().zip(made));
+        });
     }
 
-    /// Divides what no block could, in wider and wider regions. There is little of it, if any.
-    fn finish_rest(&self) {
-        let mut visitor = Visitor::new();
-        for margin in WIDER_MARGINS {
-            let blocks: Vec<u32> = (0u32..)
-                .zip(&self.partition.blocks)
-                .filter(|(_, block)| self.has_unexamined(block))
-                .map(|(id, _)| id)
-                .collect();
-            for id in blocks {
-                let numbers = self.partition.around(id, margin);
-                self.divide_own(&mut visitor, id, &numbers);
-            }
-        }
-    }
-
-    fn divide_own(&self, visitor: &mut Visitor, id: u32, numbers: &[u32]) {
-        let block = &self.partition.blocks[id as usize];
-        let shared = self.bricks.get_all(numbers);
-        visitor.region.check_out(numbers, shared, &mut |n| self.bricks.get(n));
+    /// Does `work` on some bricks, in arrays. It is told which of them are the block's own, and the place of the first of those.
+    fn within(
+        &self,
+        visitor: &mut Visitor,
+        block: &partition::Block,
+        numbers: &[u32],
+        work: impl FnOnce(&mut Visitor, &[bool], u32),
+    ) {
+        let bricks = self.bricks.get_all(numbers);
+        visitor.region.check_out(numbers, bricks, &mut |n| self.bricks.get(n));
         let own = numbers.partition_point(|&b| b < block.bricks.start) as u32;
         let is_own: Vec<bool> = numbers.iter().map(|b| block.bricks.contains(b)).collect();
-        self.divide(visitor, &is_own, own);
+        work(visitor, &is_own, own);
         debug_assert!(visitor.region.mesh.is_sound());
         let made = visitor.region.check_in(own);
         self.bricks.put_all(numbers.iter().copied().zip(made));
     }
 
-    fn has_unexamined(&self, block: &partition::Block) -> bool {
-        block.bricks.clone().any(|b| self.bricks.get(b).unexamined > 0)
+    /// Divides what no block could, in wider and wider regions. There is little of it, if any; returns how many tetrahedra are left.
+    fn finish_rest(&self) -> u64 {
+        let mut visitor = Visitor::new();
+        for margin in WIDER_MARGINS {
+            for (id, block) in (0u32..).zip(&self.partition.blocks) {
+                if self.n_unexamined(block) > 0 {
+                    let numbers = self.partition.around(id, margin);
+                    self.within(&mut visitor, block, &numbers, |visitor, is_own, own| {
+                        self.divide(visitor, is_own, own);
+                    });
+                }
+            }
+        }
+        self.partition.blocks.iter().map(|block| self.n_unexamined(block)).sum()
+    }
+
+    fn n_unexamined(&self, block: &partition::Block) -> u64 {
+        block.bricks.clone().map(|b| u64::from(self.bricks.get(b).unexamined)).sum()
     }
 
     fn divide(&self, visitor: &mut Visitor, is_due: &[bool], own: u32) {

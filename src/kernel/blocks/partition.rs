@@ -12,7 +12,7 @@ const BLOCK_TETS: f64 = 32_000.0;
 /// A mesh is divided into at least so many blocks, unless these were smaller than [`BLOCK_TETS_MIN`].
 const BLOCKS_MIN: f64 = 60.0;
 const BLOCK_TETS_MIN: f64 = 6_000.0;
-/// A mesh is divided into about so many blocks at most, so that numbers of bricks have room beside those of slots.
+/// A mesh has at most about this many blocks: the number of a brick and a slot share 32 bits.
 const BLOCKS_MAX: f64 = 1_900.0;
 /// Bricks of a block, and tetrahedra of a brick when it is finished, at least.
 const BRICKS: f64 = 64.0;

@@ -176,7 +176,7 @@ impl Region {
         })
     }
 
-    /// Adds a vertex to a brick, which is told by its place.
+    /// Adds a vertex to the brick at a place of [`Region::bricks`].
     pub fn add_vertex(&mut self, point: Point, h: f32, brick: u32) -> u32 {
         self.mesh.vertices.push(Vertex::new(point, h, false, 0));
         self.brick_of.push(brick);

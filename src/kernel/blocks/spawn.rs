@@ -3,6 +3,8 @@
 //! Sizes are read off circumspheres: a tetrahedron is good if its radius is below [`RADIUS`] wanted lengths. Only tetrahedra beside a good one
 //! or beside a required face want a point, so that good layers grow from the boundary inwards as in an advancing front: over the face
 //! whose circle is smallest, at the height that makes edges of the wanted length. Where the circumcenter is nearer it is that.
+//!
+//! Source: S. Rebay, "Efficient unstructured mesh generation by means of Delaunay triangulation and Bowyer–Watson algorithm" (1993).
 
 use super::flat::FlatMesh;
 use super::region::{OUTSIDE, Region};

@@ -17,6 +17,8 @@ pub struct RefineReport {
     pub blocked: u64,
     /// Put off by a block for a neighbor, because they reach out of its margin.
     pub put_off: u64,
+    /// Tetrahedra whose points no block had room for in its margin, not even in a wide one.
+    pub unexamined: u64,
     /// Refused for nothing but their place.
     pub out_of_place: u64,
     /// Cavities, made star-shaped and allowed where they lie, that held a tetrahedron frozen beside an interface.
@@ -36,6 +38,7 @@ impl RefineReport {
         self.near += other.near;
         self.blocked += other.blocked;
         self.put_off += other.put_off;
+        self.unexamined += other.unexamined;
         self.out_of_place += other.out_of_place;
         self.frozen_hits += other.frozen_hits;
         self.over_constrained += other.over_constrained;
