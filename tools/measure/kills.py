@@ -267,12 +267,27 @@ class Kills(Bench):
                         killed.append(round(time.time() - begun, 2))
                     except ProcessLookupError:
                         pass
-                child.communicate(timeout=120)
+                self.wait(child, program)
                 if child.returncode == 0:
                     break
             run(words())
             self.check(store)
             self.note("rank", len(killed), mpirun=os.path.basename(launcher))
+
+    def wait(self, child, program):
+        """Waits for a launcher. Open MPI's sometimes waits for a lock of its own (in PMIx_server_finalize) after its ranks are gone; it is
+        killed then. Ranks that are still there after two minutes are an error."""
+        n_without_ranks = 0
+        for _ in range(24):
+            try:
+                child.communicate(timeout=5)
+                return
+            except subprocess.TimeoutExpired:
+                n_without_ranks = 0 if self.processes(program) else n_without_ranks + 1
+            if n_without_ranks == 2:
+                child.kill()
+        child.kill()
+        raise Differs(f"ranks {self.processes(program)} go on after one was killed")
 
     def processes(self, program):
         found = []
