@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::mesh::anatomy::EDGES;
+use crate::refine::Field;
 use crate::sizing::TETS_PER_LOAD;
 use tetdb_base::geom::{Point, orient};
 use tetdb_base::storage::{parallel, spare_threads};
@@ -22,12 +23,12 @@ pub(super) struct Sample {
 }
 
 /// Samples the load of coarse tetrahedra, given by their corners and the mean of the wanted lengths there.
-pub(super) fn sample(tets: &[([Point; 4], f64)], h: &(dyn Fn(Point) -> f64 + Sync)) -> Vec<Sample> {
+pub(super) fn sample(tets: &[([Point; 4], f64)], field: &Field) -> Vec<Sample> {
     let part = |tets: &[([Point; 4], f64)]| {
         let mut samples = Vec::new();
         let mut open = Vec::new();
         for &(corners, mean) in tets {
-            add(corners, mean, h, &mut open, &mut samples);
+            add(corners, mean, field, &mut open, &mut samples);
         }
         samples
     };
@@ -41,7 +42,7 @@ pub(super) fn sample(tets: &[([Point; 4], f64)], h: &(dyn Fn(Point) -> f64 + Syn
 fn add(
     corners: [Point; 4],
     mean: f64,
-    h: &(dyn Fn(Point) -> f64 + Sync),
+    field: &Field,
     open: &mut Vec<([Point; 4], u32)>,
     samples: &mut Vec<Sample>,
 ) {
@@ -56,7 +57,12 @@ fn add(
     open.push((corners, 0));
     while let Some((q, depth)) = open.pop() {
         let at = center(q);
-        let length = h(at);
+        let length = (field.h)(at);
+        if field.place.is_partial() && !field.place.reaches(&q, &[length as f32; 4]) {
+            // No points come here.
+            samples.push(Sample { at, weight: 1.0 });
+            continue;
+        }
         let weight = volume(q) / (length * length * length);
         if weight <= WEIGHT_MAX || depth == DEPTH_MAX {
             samples.push(Sample { at, weight: weight as f32 });

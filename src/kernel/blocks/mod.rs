@@ -118,7 +118,7 @@ fn samples<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<load::Sample> {
             tets.push((ends.map(|e| e.point), mean));
         }
     }
-    load::sample(&tets, field.h)
+    load::sample(&tets, field)
 }
 
 /// All that visits share.

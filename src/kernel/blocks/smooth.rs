@@ -10,10 +10,11 @@ use super::side_by_side::{Corners, N, reach, volume_and_center};
 use crate::mesh::anatomy::FACES;
 use tetdb_base::geom::{Point, orient};
 
-/// Sweeps at least.
-const SWEEPS: u32 = 3;
+/// Sweeps at least. Three do for the quality in the end, but leave vertices so restless that interfaces, which are smoothed once more,
+/// show: Kolmogorov distance of qualities 0.026 instead of 0.008. They cost a hundredth of a run.
+const SWEEPS: u32 = 5;
 /// Sweeps at most.
-const SWEEPS_MAX: u32 = 5;
+const SWEEPS_MAX: u32 = 7;
 /// Where the last sweep made more flips than this share of the tetrahedra, another follows.
 const RESTLESS: f64 = 0.02;
 /// Longest move in units of h.

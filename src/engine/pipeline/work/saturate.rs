@@ -47,9 +47,8 @@ pub fn saturate_and_optimize<P: Pages>(
     let told = |inserted| {
         watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
     };
-    // Zones are not refined in blocks yet. What lies beside one is divided as the zone was, else the interface could be seen.
     let method = common.method;
-    if method.in_blocks && zones.is_empty() && method.lengths == Lengths::Field {
+    if method.in_blocks && method.lengths == Lengths::Field {
         let told = &mut |inserted| told(inserted);
         let report = blocks::saturate(mesh, &wanted, common.mode, space.dir, told);
         let refined = clock.elapsed().as_secs_f64();
