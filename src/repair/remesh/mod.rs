@@ -1,1 +1,0 @@
-//! Surfaces remeshed within a tolerance.

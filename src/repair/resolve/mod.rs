@@ -1,1 +1,0 @@
-//! Crossing triangles divided where they cross.
