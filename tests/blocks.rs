@@ -1,4 +1,4 @@
-//! An undivided mesh that is saturated in blocks.
+//! Meshes of one sub-domain and of two that are saturated in blocks.
 //!
 //! Why: threads work on parts of the mesh at the same time, and parts leave memory. Neither may show in the mesh, and no face of the
 //! input may be lost where a part ends.
@@ -9,7 +9,7 @@
 use tetdb_base::storage::{Budget, CancelToken, RunContext, ScratchSpace};
 use tetdb_base::surface::Surface;
 use tetdb_engine::pipeline::{
-    self, MeshOptions, Options, OptionsText, Plan, RunOptions, Trial, silent,
+    self, MeshOptions, Options, OptionsText, Plan, RunOptions, Subdomains, Summary, Trial, silent,
 };
 use tetdb_kernel::bisect::Method;
 use tetdb_kernel::samples::SampleSpec;
@@ -17,10 +17,13 @@ use tetdb_schema::catalog::Job;
 use tetdb_store::audit::{self, Level, Report, VerifyOptions};
 use tetdb_store::store::Catalog;
 
-/// What is compared of a mesh.
+/// A finished mesh.
 struct Made {
+    /// Result of its verification.
     report: Report,
+    /// Tetrahedra with q of 2 and more.
     bad: u64,
+    /// Greatest q.
     worst: f64,
 }
 
@@ -34,22 +37,24 @@ fn made(surface: &Surface, mesh: &MeshOptions, in_blocks: bool, plan: Option<Pla
     let budget = Budget::new(256 << 20);
     let mut catalog = Catalog::create(&path, &Job::default()).expect("an empty place");
     let summary = pipeline::mesh(&mut catalog, surface, &options, &budget, &silent);
-    let fine = summary.expect("a sample meshes").fine;
+    let Summary { fine, cuts, subdomains, .. } = summary.expect("a sample meshes");
+    assert_eq!(mesh.subdomains, Subdomains::Exactly(subdomains));
     assert!(fine.values().all(|fine| fine.refine.unexamined == 0), "{fine:?}");
+    assert!(cuts.iter().all(|cut| cut.refine.unexamined == 0), "{cuts:?}");
     catalog.close().expect("room on the disk");
     let mut store = Catalog::open(&path).expect("what was just written");
-    let row = store.subdomains().expect("sealed rows").remove(0);
+    let rows = store.subdomains().expect("sealed rows");
     let verify =
         VerifyOptions { level: Level::Delaunay, memory_bytes: 64 << 20, temp_dir: path.clone() };
     let report = audit::verify(&mut store, Some(surface), &verify).expect("a sound store");
     assert!(report.valid, "{report:?}");
-    let bins = row.quality.bins;
-    Made { report, bad: bins[1..].iter().sum(), worst: row.quality.worst }
+    let bad = rows.iter().flat_map(|row| &row.quality.bins[1..]).sum();
+    Made { report, bad, worst: rows.iter().map(|row| row.quality.worst).fold(0.0, f64::max) }
 }
 
-fn options(regions: Option<&str>) -> MeshOptions {
+fn options(regions: Option<&str>, subdomains: u32) -> MeshOptions {
     let text = OptionsText {
-        subdomains: Some("1".to_owned()),
+        subdomains: Some(subdomains.to_string()),
         regions: regions.map(str::to_owned),
         ..OptionsText::default()
     };
@@ -60,17 +65,19 @@ fn options(regions: Option<&str>) -> MeshOptions {
 fn neither_threads_nor_memory_show() {
     // Frames for 16 pages: everything leaves memory again and again.
     let narrow = Plan { frames: 1 << 20, redb: 1 << 20, buffers: 2 << 20 };
-    for (words, regions) in [
-        ("knot,h=0.06", None),
-        ("balls,count=20", Some("all")),
-        ("faults,cells=16", None),
-        ("wells,cells=14,count=40", None),
-        ("needles,count=300", None),
+    for (words, regions, subdomains) in [
+        ("knot,h=0.06", None, 1),
+        ("balls,count=20", Some("all"), 1),
+        ("faults,cells=16", None, 1),
+        ("wells,cells=14,count=40", None, 1),
+        ("needles,count=300", None, 1),
+        ("balls,count=20", None, 2),
+        ("faults,cells=20", None, 2),
     ] {
         let spec = SampleSpec::parse(words).and_then(|spec| spec.make());
         let mut surface: Surface = spec.expect("a sample").into();
         surface.add_support_triangles(&ScratchSpace::boundless()).expect("edges apart");
-        let options = options(regions);
+        let options = options(regions, subdomains);
         let run = |threads, plan| {
             let run = RunContext::new(threads, CancelToken::new());
             run.enter(|| made(&surface, &options, true, plan))

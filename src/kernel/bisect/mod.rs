@@ -57,12 +57,19 @@ pub struct Method {
     pub lengths: Lengths,
     /// Choice of the cutting plane.
     pub plane: PlaneChoice,
-    /// True to saturate in blocks, which is not finished.
+    /// True to saturate in blocks where lengths come from the field. Not finished.
     pub in_blocks: bool,
 }
 
+impl Method {
+    /// Returns whether saturation goes in blocks.
+    pub fn uses_blocks(&self) -> bool {
+        self.in_blocks && self.lengths == Lengths::Field
+    }
+}
+
 /// Sweeps of smoothing of a core whose surroundings are smoothed in blocks, once more with all but its interface. On a box of 1.2 M the
-/// Kolmogorov distance of qualities near the interface is 0.008 with two, 0.018 with three and 0.066 with as many as bring the core to rest.
+/// Kolmogorov distance of qualities near the interface is 0.008 with two, 0.018 with three and 0.038 with as many as bring the core to rest.
 const CORE_SWEEPS: u32 = 2;
 
 /// Parameters of a cut.
@@ -139,7 +146,7 @@ pub fn refine<P: Pages>(
         bounds: plan.bounds,
     };
     let progress = &mut |n| progress("refine the zone", n);
-    let refine = match plan.method.in_blocks && field.lengths == Lengths::Field {
+    let refine = match plan.method.uses_blocks() {
         true => blocks::saturate(host, &field, Mode::None, space.dir, progress).refine,
         false => saturate(host, &field, space, progress)?,
     };
@@ -162,7 +169,7 @@ pub fn choose<P: Pages, Q: Pages>(
     progress("choose the interface", 0);
     let core_boundary = core::extract(host, core, &zone.surface);
     let mut settings = plan.optimize;
-    if plan.method.in_blocks {
+    if plan.method.uses_blocks() {
         settings.odt_sweeps = settings.odt_sweeps.min(CORE_SWEEPS);
     }
     optimize::run_with(core, settings, &|_| {});

@@ -169,7 +169,7 @@ impl Visits<'_, '_> {
         });
     }
 
-    /// Does `work` on some bricks, in arrays. It is told which of them are the block's own, and the place of the first of those.
+    /// Runs `work` on the arrays of some bricks. Its arguments say which bricks are the block's own, and where the first of these is in the list.
     fn within(
         &self,
         visitor: &mut Visitor,

@@ -10,7 +10,7 @@ use tetdb_kernel::bisect::{OutsideZones, Zone};
 use tetdb_kernel::blocks;
 use tetdb_kernel::mesh::{Mesh, Workspace};
 use tetdb_kernel::optimize::{self, Mode, OptimizeReport};
-use tetdb_kernel::refine::{Everywhere, Field, Lengths, PlacementRule, RefineReport, saturate};
+use tetdb_kernel::refine::{Everywhere, Field, PlacementRule, RefineReport, saturate};
 use tetdb_kernel::sizing::SizeField;
 
 /// Report of the fine step.
@@ -47,8 +47,7 @@ pub fn saturate_and_optimize<P: Pages>(
     let told = |inserted| {
         watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
     };
-    let method = common.method;
-    if method.in_blocks && method.lengths == Lengths::Field {
+    if common.method.uses_blocks() {
         let told = &mut |inserted| told(inserted);
         let report = blocks::saturate(mesh, &wanted, common.mode, space.dir, told);
         let refined = clock.elapsed().as_secs_f64();
