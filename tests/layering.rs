@@ -27,6 +27,7 @@ const HOUSE: &[(&str, &[&[&str]])] = &[
             &["bisect"],
         ],
     ),
+    ("repair", &[&["resolve", "remesh"]]),
     ("store", &[&["sealed"], &["store"], &["query", "audit"]]),
     ("io", &[&["read", "write"]]),
     ("engine", &[&["pipeline"], &["view"], &["api"]]),

@@ -1,0 +1,14 @@
+//! Surfaces made fit for meshing: crossing triangles divided along their intersections, surfaces remeshed within a tolerance.
+//!
+//! | module | subject |
+//! |---|---|
+//! | [`resolve`] | crossing triangles are divided where they cross |
+//! | [`remesh`] | needles vanish, and every point stays within a tolerance |
+//!
+//! A surface goes in and a surface comes out, with a report of what was changed. Nothing here reads or writes files. Programs use the
+//! crate `tetdb`; the items here may change at any time.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod remesh;
+pub mod resolve;

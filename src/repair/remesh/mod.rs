@@ -1,0 +1,1 @@
+//! Surfaces remeshed within a tolerance.

@@ -1,0 +1,1 @@
+//! Crossing triangles divided where they cross.
