@@ -42,6 +42,8 @@ const GRID_FROM: usize = 3;
 const GRID_BITS: i32 = 50;
 /// A fold lower than this share of the diagonal is rounding, and is dropped where it closed on itself.
 const FOLD_SHARE: f64 = 1e-12;
+/// Pairs grow at most to this many times those at first. Where they grow, rounding makes more than dividing resolves.
+const GROWTH_MAX: u64 = 8;
 /// Triangles handled between two looks at whether the run is cancelled.
 const AT_ONCE: usize = 1 << 12;
 /// Places listed at most.
@@ -112,7 +114,7 @@ pub fn resolve(surface: &mut Surface, scratch: &ScratchSpace) -> Result<Resolved
             done.points_added = surface.n_vertices().saturating_sub(n_points);
             return Ok(done);
         }
-        if done.rounds == ROUNDS_MAX {
+        if done.rounds == ROUNDS_MAX || pairs.len() as u64 > GROWTH_MAX * done.pairs + 1000 {
             let places = pairs.iter().take(LISTED_MAX).map(|(_, contact)| *contact).collect();
             return Err(ResolveError::Unsettled {
                 n: pairs.len() as u64,
