@@ -14,6 +14,7 @@
 mod arrangement;
 mod exact;
 mod meeting;
+mod near;
 mod triangulation;
 
 #[cfg(test)]
@@ -26,7 +27,8 @@ use rayon::prelude::*;
 use arrangement::Arrangement;
 use exact::ExactPoint;
 use meeting::{Meeting, clipped, meeting};
-use tetdb_base::geom::Point;
+use near::join_near;
+use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{ScratchSpace, check_cancelled, parallel};
 use tetdb_base::surface::{
     Contact, Merged, PAIRS_MAX, Surface, VertexTable, drop_folds, drop_unused_points,
@@ -35,7 +37,7 @@ use tetdb_base::surface::{
 use triangulation::triangulate;
 
 /// Rounds at most. Surfaces of real files take two or three; with more, a knot of needles is beyond doubles.
-const ROUNDS_MAX: usize = 12;
+const ROUNDS_MAX: usize = 8;
 /// From this round on, constructed points are rounded to the grid, so that what is left of a crossing shrinks to nothing.
 const GRID_FROM: usize = 3;
 /// Cells of the grid along the longest coordinate, as a power of two; each later round takes cells twice as long.
@@ -43,7 +45,11 @@ const GRID_BITS: i32 = 50;
 /// A fold lower than this share of the diagonal is rounding, and is dropped where it closed on itself.
 const FOLD_SHARE: f64 = 1e-12;
 /// Pairs grow at most to this many times those at first. Where they grow, rounding makes more than dividing resolves.
-const GROWTH_MAX: u64 = 8;
+const GROWTH_MAX: u64 = 4;
+const GROWTH_LEAST: u64 = 200;
+/// Where rounding makes new crossings again and again, what is nearer than the largest coordinate times two to minus this is joined.
+/// Rounding turns walls by some 2^-52 of it; a reach much longer would join what is apart.
+const REACH_BITS: [i32; 2] = [46, 42];
 /// Triangles handled between two looks at whether the run is cancelled.
 const AT_ONCE: usize = 1 << 12;
 /// Places listed at most.
@@ -97,34 +103,65 @@ pub enum ResolveError {
 /// [`ResolveError`]; the surface is then between two rounds.
 pub fn resolve(surface: &mut Surface, scratch: &ScratchSpace) -> Result<Resolved, ResolveError> {
     let mut done = Resolved::default();
-    let n_points = surface.n_vertices();
+    done.merge(surface);
+    let pairs = pairs_that_touch(surface, scratch).ok_or(ResolveError::TooMany)?;
+    if pairs.is_empty() {
+        return Ok(done);
+    }
+    done.pairs = pairs.len() as u64;
+    let (original, first, n_points) = (surface.clone(), done, surface.n_vertices());
+    let mut found = settle(surface, scratch, &mut done);
+    for bits in REACH_BITS {
+        if found.is_ok() {
+            break;
+        }
+        (*surface, done) = (original.clone(), first);
+        join_near(surface, largest(surface) * 2f64.powi(-bits), scratch, &mut done);
+        found = settle(surface, scratch, &mut done);
+    }
+    found?;
+    done.points_added = surface.n_vertices().saturating_sub(n_points);
+    Ok(done)
+}
+
+/// Divides until no pair is left.
+fn settle(
+    surface: &mut Surface,
+    scratch: &ScratchSpace,
+    done: &mut Resolved,
+) -> Result<(), ResolveError> {
     loop {
-        let Merged { collapsed, repeated } = merge_repeated(surface);
-        done.collapsed += collapsed;
-        done.merged += repeated;
+        done.merge(surface);
         if done.rounds > 0 {
             done.collapsed += drop_folds(surface, FOLD_SHARE * surface.bounds().diagonal());
         }
         check_cancelled();
         let pairs = pairs_that_touch(surface, scratch).ok_or(ResolveError::TooMany)?;
-        if done.rounds == 0 {
-            done.pairs = pairs.len() as u64;
-        }
         if pairs.is_empty() {
-            done.points_added = surface.n_vertices().saturating_sub(n_points);
-            return Ok(done);
+            return Ok(());
         }
-        if done.rounds == ROUNDS_MAX || pairs.len() as u64 > GROWTH_MAX * done.pairs + 1000 {
+        let n = pairs.len() as u64;
+        if done.rounds == ROUNDS_MAX || n > GROWTH_MAX * done.pairs + GROWTH_LEAST {
             let places = pairs.iter().take(LISTED_MAX).map(|(_, contact)| *contact).collect();
-            return Err(ResolveError::Unsettled {
-                n: pairs.len() as u64,
-                rounds: done.rounds,
-                places,
-            });
+            return Err(ResolveError::Unsettled { n, rounds: done.rounds, places });
         }
         done.rounds += 1;
-        round(surface, &pairs, &mut done);
+        round(surface, &pairs, done);
     }
+}
+
+impl Resolved {
+    fn merge(&mut self, surface: &mut Surface) {
+        let Merged { collapsed, repeated } = merge_repeated(surface);
+        self.collapsed += collapsed;
+        self.merged += repeated;
+    }
+}
+
+/// The largest coordinate.
+fn largest(surface: &Surface) -> f64 {
+    let Aabb { low, high } = surface.bounds();
+    low.abs().max(high.abs()).max_element()
 }
 
 /// `work` on all items in order, on all threads; a cancelled run unwinds.
@@ -204,9 +241,8 @@ fn share_edges(surface: &Surface, divided: &mut BTreeMap<u32, Arrangement>) {
 
 /// Replaces divided triangles by their pieces, and rounds the points.
 fn replace(surface: &mut Surface, divided: BTreeMap<u32, Arrangement>, done: &mut Resolved) {
-    let largest = surface.bounds().high.abs().max(surface.bounds().low.abs()).max_element();
     let grid = (done.rounds >= GRID_FROM).then(|| {
-        let exponent = largest.log2().ceil() as i32 - GRID_BITS + (done.rounds - GRID_FROM) as i32;
+        let exponent = largest(surface).log2().ceil() as i32 - GRID_BITS + (done.rounds - GRID_FROM) as i32;
         2f64.powi(exponent)
     });
     let divided: Vec<(u32, Arrangement)> = divided.into_iter().collect();

@@ -273,13 +273,21 @@ fn stress() {
             let mut after = surface(&both);
             match resolve(&mut after, &ScratchSpace::boundless()) {
                 Ok(d) => {
-                    if !validate(&after).is_valid() { println!("kind {kind} seed {seed}: invalid {:?}", validate(&after).defects[0]); }
+                    if !validate(&after).is_valid() {
+                        println!(
+                            "kind {kind} seed {seed}: invalid {:?}",
+                            validate(&after).defects[0]
+                        );
+                    }
                     worst.rounds = worst.rounds.max(d.rounds);
                     worst.pairs = worst.pairs.max(d.pairs);
                     worst.points_added = worst.points_added.max(d.points_added);
                     worst.moved_most = worst.moved_most.max(d.moved_most);
                 }
-                Err(e) => {bad += 1; println!("kind {kind} seed {seed}: {e}")}
+                Err(e) => {
+                    bad += 1;
+                    println!("kind {kind} seed {seed}: {e}")
+                }
             }
         }
         println!("kind {kind}: bad {bad} {worst:?} {:?}", t0.elapsed());
