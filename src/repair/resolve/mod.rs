@@ -8,7 +8,7 @@
 //!   -> points rounded once, then again from the start until no pair is left
 //! ```
 //!
-//! All signs and comparisons are exact until a point is rounded to doubles. Points that round to one position are one. Rounding turns
+//! All signs and comparisons are exact until a point is rounded to doubles, which may join it to a vertex some 1e-15 away. Rounding turns
 //! the pieces of a triangle by some 1e-16 of the size, so that new pairs may touch; that is what the rounds are for.
 
 mod arrangement;
@@ -27,29 +27,22 @@ use rayon::prelude::*;
 use arrangement::Arrangement;
 use exact::ExactPoint;
 use meeting::{Meeting, clipped, meeting};
-use near::join_near;
-use tetdb_base::geom::{Aabb, Point};
+use near::NearVertices;
+use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, check_cancelled, parallel};
 use tetdb_base::surface::{
-    Contact, Merged, PAIRS_MAX, Surface, VertexTable, drop_folds, drop_unused_points,
-    merge_repeated, pairs_that_touch, replace_triangles,
+    Contact, Merged, PAIRS_MAX, Surface, drop_folds, drop_unused_points, merge_repeated,
+    pairs_that_touch, replace_triangles,
 };
 use triangulation::triangulate;
 
 /// Rounds at most. Surfaces of real files take two or three; with more, a knot of needles is beyond doubles.
-const ROUNDS_MAX: usize = 8;
-/// From this round on, constructed points are rounded to the grid, so that what is left of a crossing shrinks to nothing.
-const GRID_FROM: usize = 3;
-/// Cells of the grid along the longest coordinate, as a power of two; each later round takes cells twice as long.
-const GRID_BITS: i32 = 50;
+const ROUNDS_MAX: usize = 12;
 /// A fold lower than this share of the diagonal is rounding, and is dropped where it closed on itself.
 const FOLD_SHARE: f64 = 1e-12;
 /// Pairs grow at most to this many times those at first. Where they grow, rounding makes more than dividing resolves.
 const GROWTH_MAX: u64 = 4;
 const GROWTH_LEAST: u64 = 200;
-/// Where rounding makes new crossings again and again, what is nearer than the largest coordinate times two to minus this is joined.
-/// Rounding turns walls by some 2^-52 of it; a reach much longer would join what is apart.
-const REACH_BITS: [i32; 2] = [46, 42];
 /// Triangles handled between two looks at whether the run is cancelled.
 const AT_ONCE: usize = 1 << 12;
 /// Places listed at most.
@@ -103,33 +96,7 @@ pub enum ResolveError {
 /// [`ResolveError`]; the surface is then between two rounds.
 pub fn resolve(surface: &mut Surface, scratch: &ScratchSpace) -> Result<Resolved, ResolveError> {
     let mut done = Resolved::default();
-    done.merge(surface);
-    let pairs = pairs_that_touch(surface, scratch).ok_or(ResolveError::TooMany)?;
-    if pairs.is_empty() {
-        return Ok(done);
-    }
-    done.pairs = pairs.len() as u64;
-    let (original, first, n_points) = (surface.clone(), done, surface.n_vertices());
-    let mut found = settle(surface, scratch, &mut done);
-    for bits in REACH_BITS {
-        if found.is_ok() {
-            break;
-        }
-        (*surface, done) = (original.clone(), first);
-        join_near(surface, largest(surface) * 2f64.powi(-bits), scratch, &mut done);
-        found = settle(surface, scratch, &mut done);
-    }
-    found?;
-    done.points_added = surface.n_vertices().saturating_sub(n_points);
-    Ok(done)
-}
-
-/// Divides until no pair is left.
-fn settle(
-    surface: &mut Surface,
-    scratch: &ScratchSpace,
-    done: &mut Resolved,
-) -> Result<(), ResolveError> {
+    let n_points = surface.n_vertices();
     loop {
         done.merge(surface);
         if done.rounds > 0 {
@@ -137,16 +104,20 @@ fn settle(
         }
         check_cancelled();
         let pairs = pairs_that_touch(surface, scratch).ok_or(ResolveError::TooMany)?;
-        if pairs.is_empty() {
-            return Ok(());
-        }
         let n = pairs.len() as u64;
+        if done.rounds == 0 {
+            done.pairs = n;
+        }
+        if n == 0 {
+            done.points_added = surface.n_vertices().saturating_sub(n_points);
+            return Ok(done);
+        }
         if done.rounds == ROUNDS_MAX || n > GROWTH_MAX * done.pairs + GROWTH_LEAST {
             let places = pairs.iter().take(LISTED_MAX).map(|(_, contact)| *contact).collect();
             return Err(ResolveError::Unsettled { n, rounds: done.rounds, places });
         }
         done.rounds += 1;
-        round(surface, &pairs, done);
+        round(surface, &pairs, &mut done);
     }
 }
 
@@ -156,12 +127,6 @@ impl Resolved {
         self.collapsed += collapsed;
         self.merged += repeated;
     }
-}
-
-/// The largest coordinate.
-fn largest(surface: &Surface) -> f64 {
-    let Aabb { low, high } = surface.bounds();
-    low.abs().max(high.abs()).max_element()
 }
 
 /// `work` on all items in order, on all threads; a cancelled run unwinds.
@@ -241,27 +206,23 @@ fn share_edges(surface: &Surface, divided: &mut BTreeMap<u32, Arrangement>) {
 
 /// Replaces divided triangles by their pieces, and rounds the points.
 fn replace(surface: &mut Surface, divided: BTreeMap<u32, Arrangement>, done: &mut Resolved) {
-    let grid = (done.rounds >= GRID_FROM).then(|| {
-        let exponent = largest(surface).log2().ceil() as i32 - GRID_BITS + (done.rounds - GRID_FROM) as i32;
-        2f64.powi(exponent)
-    });
     let divided: Vec<(u32, Arrangement)> = divided.into_iter().collect();
     let triangulated = all(&divided, |(_, arrangement)| {
-        let place = |p: &ExactPoint| {
-            let at = grid.map_or(p.at, |grid| (p.at / grid).round() * grid) + Point::ZERO;
-            (at, p.distance(at))
-        };
-        let places: Vec<(Point, f64)> = arrangement.points[3..].iter().map(place).collect();
-        (triangulate(arrangement), places)
+        let places = arrangement.points[3..].iter().map(|p| (p.at + Point::ZERO, p.distance(p.at)));
+        (triangulate(arrangement), places.collect::<Vec<_>>())
     });
-    let mut table = VertexTable::new(&surface.points);
+    let mut near = NearVertices::new(surface);
+    for v in divided.iter().flat_map(|(t, _)| surface.triangles[*t as usize]) {
+        near.add(v, surface.points[v as usize]);
+    }
     let mut pieces: HashMap<u32, Vec<[u32; 3]>> = HashMap::new();
     let mut is_short = false;
     for ((t, _), (triangles, places)) in divided.iter().zip(triangulated) {
         let mut ids = surface.triangles[*t as usize].to_vec();
         for (at, moved) in places {
-            done.moved_most = done.moved_most.max(moved);
-            ids.push(table.find_or_add(at, &mut surface.points));
+            let (v, distance) = near.find_or_add(at, &mut surface.points);
+            done.moved_most = done.moved_most.max(moved + distance);
+            ids.push(v);
         }
         let mut kept = triangles;
         kept.iter_mut().for_each(|t| *t = t.map(|p| ids[p as usize]));

@@ -253,43 +253,24 @@ fn a_heap_beyond_the_limit_is_an_error() {
     assert!(error.to_string().contains("3 pairs"));
 }
 #[test]
-#[ignore]
-fn stress() {
-    for kind in 0..4 {
-        let t0 = std::time::Instant::now();
-        let mut bad = 0;
-        let mut worst = Resolved::default();
-        for seed in 0..20u64 {
-            let at = |k: u64| (mix(seed << 32 | k << 8 | kind) >> 11) as f64 / (1u64 << 53) as f64;
-            let turn = 0.1 + at(0);
-            let low = match kind {
-                0 => p(at(1) * 0.5, at(2) * 0.5, 1.0),
-                1 => p(at(1) * 0.5, at(2) * 0.5, 0.0),
-                2 => p(at(1) * 0.5, at(2), at(3)),
-                _ => p(0.0, 0.0, at(3)),
-            };
-            let mut both = block("a", Point::ZERO, Point::ONE, turn);
-            both.extend(block("b", low, low + Point::ONE, turn));
-            let mut after = surface(&both);
-            match resolve(&mut after, &ScratchSpace::boundless()) {
-                Ok(d) => {
-                    if !validate(&after).is_valid() {
-                        println!(
-                            "kind {kind} seed {seed}: invalid {:?}",
-                            validate(&after).defects[0]
-                        );
-                    }
-                    worst.rounds = worst.rounds.max(d.rounds);
-                    worst.pairs = worst.pairs.max(d.pairs);
-                    worst.points_added = worst.points_added.max(d.points_added);
-                    worst.moved_most = worst.moved_most.max(d.moved_most);
-                }
-                Err(e) => {
-                    bad += 1;
-                    println!("kind {kind} seed {seed}: {e}")
-                }
+fn walls_that_nearly_coincide_settle_or_are_named() {
+    let mut n_settled = 0;
+    for seed in 0..10u64 {
+        let at = |k: u64| (mix(seed << 8 | k) >> 11) as f64 / (1u64 << 53) as f64;
+        let low = p(0.5 * at(1), 0.5 * at(2), 1.0);
+        let mut both = block("a", Point::ZERO, Point::ONE, 0.1 + at(0));
+        both.extend(block("b", low, low + Point::ONE, 0.1 + at(0)));
+        let mut after = surface(&both);
+        match resolve(&mut after, &ScratchSpace::boundless()) {
+            Ok(_) => {
+                assert!(validate(&after).is_valid(), "seed {seed}");
+                n_settled += 1;
             }
+            Err(ResolveError::Unsettled { places, .. }) => {
+                assert!(!places.is_empty() && places.iter().all(|c| c.at.is_finite()));
+            }
+            Err(error) => panic!("seed {seed}: {error}"),
         }
-        println!("kind {kind}: bad {bad} {worst:?} {:?}", t0.elapsed());
     }
+    assert!(n_settled >= 8, "{n_settled}");
 }
