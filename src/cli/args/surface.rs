@@ -85,6 +85,7 @@ pub struct CheckArgs {
     Keys, each with a default:
   balls   count, seed, h      a cube with empty balls of many sizes in it
   box     x, y, z, h          sides of a box
+  broken  kind, count, seed, h  kind is holes, crossings, doubled, cracks, turned, tjunctions or soup
   caps    count, seed         a column with flat ends of many corners, badly cut into triangles
   faults  count, seed, cells, shift  a box with sheets in it that cut each other and end inside
   grains  count, seed, h      disjoint convex polyhedra in a box; mesh them with --regions all
@@ -97,7 +98,7 @@ pub struct CheckArgs {
 h is the length of the edges."
 )]
 pub struct SampleArgs {
-    /// NAME,key=value,... with the names balls, box, caps, faults, grains, knot, needles, shells, sphere, steps, wells
+    /// NAME,key=value,... with the names balls, box, broken, caps, faults, grains, knot, needles, shells, sphere, steps, wells
     #[arg(value_name = "SAMPLE")]
     pub sample: String,
     /// The file to write: .stl (text), .off, .obj or .ply, all exact; - is the standard output
