@@ -120,7 +120,7 @@ impl Arrangement {
     }
 
     /// Returns whether nothing divides the triangle.
-    pub fn is_whole(&self) -> bool {
+    pub fn is_undivided(&self) -> bool {
         self.points.len() == 3
     }
 

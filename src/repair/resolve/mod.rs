@@ -172,7 +172,7 @@ fn round(surface: &mut Surface, pairs: &[([u32; 2], Contact)], done: &mut Resolv
     let touched = touched.into_iter().map(|(t, _)| t);
     let mut divided: BTreeMap<u32, Arrangement> = touched.zip(arrangements).collect();
     share_edges(surface, &mut divided);
-    divided.retain(|_, arrangement| !arrangement.is_whole());
+    divided.retain(|_, arrangement| !arrangement.is_undivided());
     replace(surface, divided, done);
 }
 
