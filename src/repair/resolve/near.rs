@@ -37,8 +37,12 @@ impl NearVertices {
         }
     }
 
-    /// The nearest vertex within reach of `p`, and how far it is; otherwise a new one at `p`.
+    /// The vertex at `p`, or the nearest within reach and how far it is; otherwise a new one at `p`.
     pub fn find_or_add(&mut self, p: Point, points: &mut Vec<Point>) -> (u32, f64) {
+        // Also one of a triangle that is not divided.
+        if self.all.find(p, points) {
+            return (self.all.find_or_add(p, points), 0.0);
+        }
         let middle = self.cell(p);
         let around = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
         let cells = around.map(|step| [0, 1, 2].map(|axis| middle[axis] + step[axis]));

@@ -253,6 +253,19 @@ fn a_heap_beyond_the_limit_is_an_error() {
     assert!(error.to_string().contains("3 pairs"));
 }
 #[test]
+fn a_vertex_on_an_edge_and_next_to_its_end_is_put_in() {
+    let near = 2f64.powi(-50);
+    let flat = [p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(0.0, 1.0, 0.0)];
+    for x in [near, 4.0 * near, 1.0 - near] {
+        let (after, _) = resolved(&[
+            ("flat", flat),
+            ("up", [p(x, 0.0, 0.0), p(0.5, -1.0, 1.0), p(0.7, -1.0, 1.0)]),
+        ]);
+        assert_eq!((after.n_triangles(), after.n_vertices()), (3, 6));
+    }
+}
+
+#[test]
 fn walls_that_nearly_coincide_settle_or_are_named() {
     let mut n_settled = 0;
     for seed in 0..10u64 {
