@@ -9,12 +9,13 @@ pub use tetdb_engine::api::{
     DefectPlace, EmbedOutside, EmbeddedInfo, EmbeddedKind, Error, Event, Existing, ExportOptions,
     Exported, ExprError, GatherReport, LabelSet, Length, MESH_ENDINGS, MeshFormat, MeshOptions,
     Mesher, Optimize, OptionsText, Order, Population, Prediction, Qualities, Query, RegionInfo,
-    Regions, Remesh, RemeshForecast, Remeshed, RepairReport, Reported, SAMPLE_PREFIX, Seal, Seed,
-    SeedKind, Settings, Share, ShownTriangles, SizeWarning, Sizes, Snapped, Snapshot, SplitReport,
-    StageInfo, Store, StoreInfo, SubdomainInfo, Subdomains, Suggestion, Summary, Surface,
-    SurfaceReport, SurfaceWritten, TaskReport, TaskStage, TaskStatus, Tasks, TetId, VARIABLES,
-    Verification, VerifyLevel, VertexId, WELD_SHARE_MAX, Word, WorkersPrediction, Writers,
-    check_target, csv_head, inputs_of, peak_bytes, short, task_ranges, typed,
+    Regions, Remesh, RemeshForecast, Remeshed, RepairKind, RepairReport, Reported, ResolveReport,
+    SAMPLE_PREFIX, Seal, Seed, SeedKind, Settings, Share, ShownTriangles, SizeWarning, Sizes,
+    Snapped, Snapshot, SplitReport, StageInfo, Store, StoreInfo, SubdomainInfo, Subdomains,
+    Suggestion, Summary, Surface, SurfaceReport, SurfaceWritten, TaskReport, TaskStage, TaskStatus,
+    Tasks, TetId, VARIABLES, Verification, VerifyLevel, VertexId, WELD_SHARE_MAX, Word,
+    WorkersPrediction, Writers, check_target, csv_head, inputs_of, peak_bytes, short, task_ranges,
+    typed,
 };
 
 #[cfg(feature = "mpi")]

@@ -26,6 +26,8 @@ pub enum Origin {
     Sheet(NamedFile),
     /// All triangles from this number on are sheets.
     SheetsFrom(usize),
+    /// Crossing triangles were divided; what was done, in words. The fingerprint is that of the divided surface.
+    Resolved(String),
     /// All parts that are not closed are sheets.
     OpenParts,
     /// Embedded edges.
@@ -51,6 +53,7 @@ const SAMPLE: &str = "sample:";
 const COPY: &str = "store:surface.obj";
 const SHEET: &str = "sheet:";
 const SHEETS_FROM: &str = "sheets-from:";
+const RESOLVED: &str = "resolved:";
 const OPEN_PARTS: &str = "open-parts:";
 const EDGES: &str = "edges:";
 const POINTS: &str = "points:";
@@ -74,6 +77,8 @@ impl Source {
             Origin::Copy
         } else if text == OPEN_PARTS {
             Origin::OpenParts
+        } else if let Some(rest) = after(RESOLVED) {
+            Origin::Resolved(rest.to_owned())
         } else if let Some(rest) = after(SHEETS_FROM) {
             Origin::SheetsFrom(rest.parse().ok()?)
         } else if let Some(rest) = after(SHEET) {
@@ -101,6 +106,7 @@ impl Source {
             Origin::Copy => COPY.to_owned(),
             Origin::Sheet(file) => named(SHEET, file),
             Origin::SheetsFrom(first) => format!("{SHEETS_FROM}{first}"),
+            Origin::Resolved(what) => format!("{RESOLVED}{what}"),
             Origin::OpenParts => OPEN_PARTS.to_owned(),
             Origin::Edges(file) => named(EDGES, file),
             Origin::Points(file) => named(POINTS, file),
@@ -142,6 +148,7 @@ mod tests {
             "sheet:north=/home/a/fault=1.stl",
             "sheets-from:120",
             "open-parts:",
+            "resolved:56 pairs",
             "edges:well=/home/a/wells.obj",
             "points:sensor=/home/a/p.csv",
             "wires:12,3",

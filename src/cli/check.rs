@@ -13,11 +13,13 @@ use super::input;
 use super::memory;
 use super::words;
 use tetdb_engine::api::targets::check_target;
-use tetdb_engine::api::{Code, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short, typed};
+use tetdb_engine::api::{
+    Code, RepairKind, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short, typed,
+};
 
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are validated before anything is read.
-    if args.repair && (args.sheets.allow_open || args.sheets.files().next().is_some()) {
+    if args.repair.is_some() && (args.sheets.allow_open || args.sheets.files().next().is_some()) {
         return Err(Failure::new(Code::Usage, "a surface is repaired before sheets are embedded")
             .help("repair each file for itself"));
     }
@@ -30,15 +32,22 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // A check writes no temporary files next to its input.
     let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
     let options = typed(config::inside_of(&args.inside))?;
-    let mut surface = input::load_with(&args.surfaces, &args.sheets, &options, &settings, console)?;
-    if !args.repair {
+    let mut surface =
+        input::load_with(&args.surfaces, None, &args.sheets, &options, &settings, console)?;
+    if args.repair.is_none() {
         surface = surface.inside_settled(options.embed_outside, &settings)?;
     }
     let mut repair = None;
-    if args.repair {
+    if args.repair == Some(None) || args.weld.is_some() {
         let done;
         (surface, done) = surface.repair_reported(weld_share, &settings)?;
         repair = Some(done);
+    }
+    let mut resolve = None;
+    if args.repair == Some(Some(RepairKind::Resolve)) {
+        let done;
+        (surface, done) = surface.resolve_reported(&settings)?;
+        resolve = Some(done);
     }
     let report = surface.report(&settings, console.is_verbose())?;
     let written = write_files(args, &surface, &report, console)?;
@@ -48,6 +57,9 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
         if let Some(repair) = &repair {
             answer["repair"] = json!(repair);
         }
+        if let Some(resolve) = &resolve {
+            answer["resolve"] = json!(resolve);
+        }
         for (field, value) in written {
             answer[field] = value;
         }
@@ -56,9 +68,12 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
         if let Some(repair) = &repair {
             print_repair(repair, console);
         }
+        if let Some(resolve) = &resolve {
+            input::note_resolved(resolve, console);
+        }
         let surfaces: Vec<String> =
             args.surfaces.iter().map(|word| words::quoted(Path::new(word))).collect();
-        let (surfaces, is_repaired) = (&surfaces.join(" "), repair.is_some());
+        let (surfaces, is_repaired) = (&surfaces.join(" "), args.repair.is_some());
         Printed { surface: &surface, report: &report, surfaces, is_repaired }.print(console);
     }
     Ok(if report.is_valid() { 0 } else { 3 })

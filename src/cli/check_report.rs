@@ -199,6 +199,19 @@ impl Printed<'_> {
         if matches!(first, Defect::OpenEdge { .. }) && self.report.closes().is_some() {
             return;
         }
+        if let Some(done) = &self.report.resolving {
+            let rest = match done.n_defects {
+                0 => String::new(),
+                n => format!("; {} left", words::count(n, "other defect")),
+            };
+            // The rule that fills what the parts fill together.
+            let regions = done.regions.first().map_or(String::new(), |r| format!(" --regions {r}"));
+            console.line(&format!(
+                "help: `tetdb mesh {} --repair resolve{regions}` divides crossing triangles first: {} triangles divided, {} vertices added, none farther than {} from its exact place{rest}",
+                self.surfaces, done.divided, done.points_added, short(done.moved_most)
+            ));
+            return;
+        }
         let is_dropped = matches!(first, Defect::Degenerate { .. } | Defect::Duplicate { .. });
         let help = if is_dropped && !self.is_repaired {
             format!("`tetdb check {} --repair --write OUT` drops such triangles", self.surfaces)

@@ -128,7 +128,7 @@ fn help_of(code: Code) -> &'static str {
             "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made. If the open part is meant as a sheet inside, give it with --embed, or use --allow-open"
         }
         Code::SelfIntersection => {
-            "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"
+            "`tetdb check SURFACE` lists the places, and says whether --repair resolve, which divides crossing triangles, leaves a surface that can be meshed"
         }
         Code::EmptySurface => "choose a file that holds triangles",
         Code::CoordinateRange => "scale the surface to ordinary units, for example metres",

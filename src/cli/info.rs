@@ -68,11 +68,12 @@ pub fn hex(digest: [u64; 2]) -> String {
 /// Prints the record for people.
 pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     let info = StoreInfo::read(path)?;
-    let surfaces = info.surfaces.iter().map(|s| match s.path.as_str() {
-        COPY => "a copy in the store of its surface",
-        path => path,
+    let surfaces = info.surfaces.iter().map(|s| match (s.path.as_str(), s.path.split_once(':')) {
+        (COPY, _) => "a copy in the store of its surface".to_owned(),
+        (_, Some(("resolved", what))) => format!("crossings resolved ({what})"),
+        (path, _) => path.to_owned(),
     });
-    let surfaces: Vec<&str> = surfaces.collect();
+    let surfaces: Vec<String> = surfaces.collect();
     let state = state_words(info.state);
     console.line(&format!("{}: {state}, from {}", path.display(), surfaces.join(", ")));
     if console.is_verbose() {

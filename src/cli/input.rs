@@ -6,7 +6,9 @@ use super::args::SheetArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::words::count;
-use tetdb_engine::api::{Code, EmbeddedKind, MeshOptions, Settings, Surface, SurfaceWritten};
+use tetdb_engine::api::{
+    Code, EmbeddedKind, MeshOptions, RepairKind, ResolveReport, Settings, Surface, SurfaceWritten,
+};
 
 /// The same settings, with temporary files in the folder of `file` or its nearest existing parent.
 pub fn scratch_beside(settings: Settings, file: &Path) -> Settings {
@@ -28,11 +30,23 @@ pub fn note_lost(surface: &Surface, written: SurfaceWritten, console: &Console) 
     }
 }
 
+/// Says what was done to crossings, and which regions there are now.
+pub fn note_resolved(done: &ResolveReport, console: &Console) {
+    console.note(&format!("note: resolved: {}", done.in_words()));
+    if let [first, rest @ ..] = &done.regions[..] {
+        let or = rest.iter().map(|rule| format!(" or --regions {rule}")).collect::<String>();
+        console.note(&format!(
+            "note: parts overlap, and parity leaves empty what lies in two of them: --regions {first}{or} fills that too"
+        ));
+    }
+}
+
 /// Reads files or generates a sample, and embeds sheets, edges and points.
 ///
 /// As `options` say, triangles are divided where edges and points lie on them, and points are moved there.
 pub fn load_with(
     arguments: &[String],
+    repair: Option<RepairKind>,
     sheets: &SheetArgs,
     options: &MeshOptions,
     settings: &Settings,
@@ -49,6 +63,11 @@ pub fn load_with(
         names.push((file, name));
     }
     let mut surface = Surface::load(arguments, settings)?;
+    if let Some(RepairKind::Resolve) = repair {
+        let done;
+        (surface, done) = surface.resolve_reported(settings)?;
+        note_resolved(&done, console);
+    }
     if sheets.allow_open {
         let (with, n) = surface.open_parts_with(settings)?;
         surface = with;

@@ -11,10 +11,11 @@ use super::{memory, threads};
 use tetdb_engine::api::{Code, MeshOptions, Settings, Store, VerifyLevel};
 
 pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
-    let embeds = args.sheets.files().next().is_some() || args.sheets.allow_open;
+    let embeds = args.sheets.files().next().is_some()
+        || args.sheets.allow_open
+        || args.repair.repair.is_some();
     if embeds && args.against.is_empty() {
-        let message =
-            "what was embedded is named beside the surface alone, and --against names none";
+        let message = "what was embedded or repaired is named beside the surface alone, and --against names none";
         return Err(Failure::new(Code::Usage, message)
             .help("name all files with --against and --embed…, or none: the store knows them"));
     }
@@ -25,8 +26,14 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
         true => store.verify(level)?,
         false => {
             let options = MeshOptions::default();
-            let surface =
-                input::load_with(&args.against, &args.sheets, &options, &settings, console)?;
+            let surface = input::load_with(
+                &args.against,
+                args.repair.repair,
+                &args.sheets,
+                &options,
+                &settings,
+                console,
+            )?;
             store.verify_against(&surface, level)?
         }
     };

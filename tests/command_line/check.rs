@@ -223,6 +223,7 @@ fn the_answer_has_its_fields() {
             "open_edges",
             "open_loops",
             "parts",
+            "resolving",
             "schema",
             "t_junctions",
             "triangles",

@@ -24,6 +24,8 @@ const RUNS: [(&str, &[&str]); 16] = [
             "check crossing.off",
             "check groups.msh",
             "check needles.off",
+            "check sample:broken,kind=crossings",
+            "check sample:broken,kind=crossings --repair=resolve --write r.off",
             "check holes.off --repair --weld 1e-3 --write fixed.off",
         ],
     ),

@@ -21,6 +21,7 @@ mod refined;
 mod regions;
 mod report;
 mod resaturate;
+mod resolve;
 mod same_mesh;
 mod seeds;
 mod sheets;

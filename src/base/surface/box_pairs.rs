@@ -38,6 +38,8 @@ impl BoxTree {
     ) -> (Vec<T>, u64) {
         let n_leaves = self.levels[0].len();
         let (mut listed, mut n_found) = (Vec::new(), 0);
+        // A caller that wants them all gets them all.
+        let block_listed_max = BLOCK_LISTED_MAX.max(listed_max / 64);
         let (mut end, mut length) = (0, ROUND_MIN);
         while end < n_leaves {
             let begin = end;
@@ -51,7 +53,7 @@ impl BoxTree {
                         let mut keep = |a: u32, b: u32| {
                             if let Some(result) = test(a, b) {
                                 n += 1;
-                                if out.len() < BLOCK_LISTED_MAX {
+                                if out.len() < block_listed_max {
                                     out.push(result);
                                 }
                             }

@@ -44,6 +44,20 @@ impl Surface {
         self.name_label_sets(0);
     }
 
+    /// Puts the first triangle of each pair into the groups of the second one too.
+    pub(super) fn join_labels(&mut self, pairs: &[[u32; 2]]) {
+        let first = self.label_names.len() as u32;
+        let mut numbers = LabelNumbers::default();
+        for set in &self.label_sets {
+            numbers.sets.insert(set.members.clone(), set.label);
+        }
+        for pair in pairs {
+            let [a, b] = pair.map(|t| self.labels[t as usize]);
+            self.labels[pair[0] as usize] = numbers.label_of_all(self, &[a, b]);
+        }
+        self.name_label_sets(first);
+    }
+
     /// Adds sets of labels whose numbers count from `first`.
     pub(super) fn add_label_sets(&mut self, first: u32, sets: &[LabelSet]) {
         let moved = |set: &LabelSet| LabelSet {

@@ -57,12 +57,16 @@ pub use edges::{Closedness, closedness};
 pub use embedded_set::{EmbedError, Embedded, EmbeddedSet};
 pub use fitness::{Fitness, fitness};
 pub use orientation::{Orientation, orient_alike, orient_alike_with};
-pub use repair::{Closing, Repair, closing, repair, repair_bytes};
+pub use repair::{
+    Closing, Merged, Repair, closing, drop_folds, merge_repeated, repair, repair_bytes,
+    replace_triangles,
+};
 pub use seeds::{Seed, SeedKind};
 pub use seeker::{Crossing, Seeker};
 pub use split::{SplitReport, predict_split, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
-pub use validate::{Validation, validate, validate_with};
+pub use validate::{PAIRS_MAX, Validation, pairs_that_touch, validate, validate_with};
+pub use vertex_table::VertexTable;
 pub use volumes::{EnclosedVolumes, OUTSIDE, VOLUMES_TRIANGLE, Wall};
-pub use weld::SurfaceBuilder;
+pub use weld::{SurfaceBuilder, drop_unused_points};
 pub use weld_near::weld_near;

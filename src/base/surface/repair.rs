@@ -1,15 +1,17 @@
 //! Repairs on demand: joins near points, drops useless triangles, divides triangles at T-junctions, turns neighbors
 //! alike.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use super::Surface;
 use super::boundary_loops::{TJunction, has_near_junctions, t_junctions};
 use super::edges::{Closedness, Facets, closedness};
+use super::label_sets::drop_unused_labels;
 use super::orientation::orient_alike;
 use super::validate::validate;
 use super::weld::drop_unused_points;
 use super::weld_near::{n_near, weld_near};
+use crate::geom::Point;
 use crate::storage::ScratchSpace;
 
 /// Shares of the box diagonal that [`closing`] tries after none.
@@ -79,13 +81,95 @@ fn drop_useless(surface: &mut Surface, done: &mut Repair) {
         drop[t as usize] = true;
     }
     if drop.contains(&true) {
-        replace(surface, |t, triangle, pieces| {
+        replace_triangles(surface, |t, triangle, pieces| {
             if !drop[t as usize] {
                 pieces.push(triangle);
             }
         });
         drop_unused_points(surface);
     }
+}
+
+/// Result of [`merge_repeated`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Merged {
+    /// Triangles without area that were dropped.
+    pub collapsed: usize,
+    /// Triangles of the same vertices and direction as an earlier one, which now has their labels too.
+    pub repeated: usize,
+}
+
+/// Drops triangles without area, and makes one triangle of those with the same vertices and direction.
+///
+/// That one is in all their groups. Effects: where something was dropped, vertices and labels that nothing uses go.
+pub fn merge_repeated(surface: &mut Surface) -> Merged {
+    let Facets { degenerate, duplicates, .. } = Facets::new(surface, &ScratchSpace::boundless());
+    if degenerate.is_empty() && duplicates.is_empty() {
+        return Merged::default();
+    }
+    let mut drop = vec![false; surface.n_triangles()];
+    degenerate.iter().for_each(|&(t, _)| drop[t as usize] = true);
+    let repeated: Vec<[u32; 2]> = duplicates
+        .into_iter()
+        .filter(|[_, t]| !std::mem::replace(&mut drop[*t as usize], true))
+        .collect();
+    surface.join_labels(&repeated);
+    replace_triangles(surface, |t, triangle, pieces| {
+        if !drop[t as usize] {
+            pieces.push(triangle);
+        }
+    });
+    drop_unused_points(surface);
+    drop_unused_labels(surface);
+    Merged { collapsed: degenerate.len(), repeated: repeated.len() }
+}
+
+/// Drops folds that closed on themselves: triangles lower than `height` with an open edge, where each other edge has three facets.
+///
+/// Without them the neighbors are joined as they were before the fold. Returns how many went.
+pub fn drop_folds(surface: &mut Surface, height: f64) -> usize {
+    let is_low = |[a, b, c]: [Point; 3]| {
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        (b - a).cross(c - a).length() <= height * longest
+    };
+    let mut n = 0;
+    loop {
+        let mut facets = Facets::new(surface, &ScratchSpace::boundless());
+        let (mut is_open, mut is_needed) =
+            (vec![false; surface.n_triangles()], vec![false; surface.n_triangles()]);
+        facets.each_edge(|uses| match uses {
+            [only] => is_open[only.triangle() as usize] = true,
+            [a, b] => [a, b].into_iter().for_each(|u| is_needed[u.triangle() as usize] = true),
+            _ => {}
+        });
+        let mut drop = BTreeSet::new();
+        let mut seen = HashSet::new();
+        for t in (0..surface.n_triangles()).filter(|&t| is_open[t] && !is_needed[t]) {
+            let edges = edges_of(surface.triangles[t]);
+            // Of two that share an edge the second is judged without the first.
+            if is_low(surface.corners(t as u32)) && !edges.iter().any(|edge| seen.contains(edge)) {
+                seen.extend(edges);
+                drop.insert(t as u32);
+            }
+        }
+        let backs = facets.two_sided.iter().filter(|[t, _]| drop.contains(t));
+        let backs: Vec<u32> = backs.map(|[_, back]| *back).collect();
+        drop.extend(backs);
+        if drop.is_empty() {
+            return n;
+        }
+        n += drop.len();
+        replace_triangles(surface, |t, triangle, pieces| {
+            if !drop.contains(&t) {
+                pieces.push(triangle);
+            }
+        });
+        drop_unused_points(surface);
+    }
+}
+
+fn edges_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
 }
 
 /// Divides triangles with vertices on an open edge of theirs, one edge of each, and returns how many.
@@ -123,7 +207,7 @@ fn divide(surface: &mut Surface, distance: f64, to_close: bool) -> usize {
             cuts.entry(triangle).or_insert(chain);
         }
     }
-    replace(surface, |t, triangle, pieces| {
+    replace_triangles(surface, |t, triangle, pieces| {
         let Some(chain) = cuts.get(&t) else {
             pieces.push(triangle);
             return;
@@ -148,7 +232,10 @@ fn may_close(found: &Closedness, junctions: &[TJunction]) -> bool {
 }
 
 /// Replaces each triangle by the output of `pieces`; labels and files follow.
-fn replace(surface: &mut Surface, pieces: impl Fn(u32, [u32; 3], &mut Vec<[u32; 3]>)) {
+pub fn replace_triangles(
+    surface: &mut Surface,
+    pieces: impl Fn(u32, [u32; 3], &mut Vec<[u32; 3]>),
+) {
     let old = std::mem::take(&mut surface.triangles);
     let old_labels = std::mem::take(&mut surface.labels);
     let mut files = surface.files.iter_mut().peekable();

@@ -187,12 +187,14 @@ impl Splitter {
         }
     }
 
-    /// Returns whether the triangles at an edge are parts of one input triangle.
+    /// Returns whether the triangles at an edge are parts of one input triangle, or of both sides of one.
     fn is_inside(&self, e: EdgeKey) -> bool {
-        match self.around.get(&e).map(Vec::as_slice) {
-            Some(&[x, y]) => self.parent[x as usize] == self.parent[y as usize],
-            _ => false,
-        }
+        let parent = |t: &u32| self.parent[*t as usize];
+        let Some(at) = self.around.get(&e) else {
+            return false;
+        };
+        // Two for each side of a wall that is given from both.
+        at.iter().all(|x| at.iter().filter(|y| parent(y) == parent(x)).count() == 2)
     }
 
     /// Swaps `e`, if it is inside an input triangle and that raises the least angle; returns the new edge.
@@ -247,7 +249,8 @@ impl Splitter {
             }
             self.around.entry(edge(p, m)).or_default().push(t);
             self.around.entry(edge(m, q)).or_default().push(new);
-            self.around.insert(edge(m, r), vec![t, new]);
+            // A wall given from both sides has two triangles here with one opposite corner.
+            self.around.entry(edge(m, r)).or_default().extend([t, new]);
             self.consider(edge(m, r), h, heap);
             opposite.extend([edge(p, r), edge(q, r)]);
         }
@@ -430,6 +433,19 @@ mod tests {
         // Four long sides with 128 pieces of each long edge; in halves of halves there would be seventeen times as many.
         let n = fine.n_triangles();
         assert!((4 * 256..4 * 600).contains(&n), "{n}");
+    }
+
+    #[test]
+    fn a_wall_given_from_both_sides_stays_one() {
+        let mut both = cube();
+        for [a, b, c] in both.triangles.clone() {
+            both.triangles.push([a, c, b]);
+            both.labels.push(0);
+        }
+        let (fine, _) = split(&both, &|p| 0.05 + 0.1 * p.x, u64::MAX).expect("few triangles");
+        let found = validate(&fine);
+        assert!(found.is_valid(), "{:?}", found.defects.first());
+        assert_eq!(2 * found.closedness.two_sided.len(), fine.n_triangles());
     }
 
     /// A cube and a slat, with lengths even, graded, and fine in one place.

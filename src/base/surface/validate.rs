@@ -3,7 +3,7 @@
 use super::boundary_loops::{JUNCTION_SHARE, TJunction, t_junctions};
 #[cfg(test)]
 use super::contact::ContactKind;
-use super::contact::contact;
+use super::contact::{Contact, contact};
 use super::edges::{Closedness, Facets};
 use super::stars::touching;
 use super::{Defect, SourceFile, Surface, SurfaceError};
@@ -98,6 +98,30 @@ pub fn validate_with(surface: &Surface, scratch: &ScratchSpace) -> Validation {
     }));
     let files = surface.files.clone();
     Validation { closedness, t_junctions, defects, n_intersections, n_defects, files }
+}
+
+/// Pairs of triangles beyond which [`pairs_that_touch`] gives up.
+pub const PAIRS_MAX: u64 = super::box_pairs::FOUND_MAX;
+
+/// All pairs of triangles that touch where they should not, sorted; `None` where there are more than [`PAIRS_MAX`].
+///
+/// Triangles without area are left out, and those of the same vertices as an earlier one. A scratch file that fails unwinds.
+pub fn pairs_that_touch(
+    surface: &Surface,
+    scratch: &ScratchSpace,
+) -> Option<Vec<([u32; 2], Contact)>> {
+    let Facets { degenerate, mut is_left_out, .. } = Facets::new(surface, scratch);
+    for (t, _) in degenerate {
+        is_left_out[t as usize] = true;
+    }
+    let look = |a: u32, b: u32| {
+        let ids = [a, b].map(|t| surface.triangles[t as usize]);
+        let found = contact(surface.corners(a), ids[0], surface.corners(b), ids[1])?;
+        Some(([a, b], found))
+    };
+    let (mut found, n) = touching(surface, &mut is_left_out, scratch, usize::MAX, look);
+    found.sort_unstable_by_key(|(triangles, _)| *triangles);
+    (n == found.len() as u64 && n <= PAIRS_MAX).then_some(found)
 }
 
 /// The defects that edges and vertices alone show.

@@ -5,7 +5,7 @@ use crate::storage::{filled, push};
 
 /// Open-addressing table from coordinate bits to vertex ids; at most half full.
 #[derive(Default)]
-pub(super) struct VertexTable {
+pub struct VertexTable {
     /// Vertex id + 1; 0 is free. The length is a power of two.
     slots: Vec<u32>,
 }
@@ -25,6 +25,7 @@ impl VertexTable {
         self.slots.len()
     }
 
+    /// The id of the vertex at `p`, which is added if new.
     pub fn find_or_add(&mut self, p: Point, points: &mut Vec<Point>) -> u32 {
         if points.len() * 2 >= self.slots.len() {
             self.grow(points);

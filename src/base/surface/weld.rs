@@ -440,7 +440,7 @@ impl SurfaceBuilder {
 }
 
 /// Keeps the points that triangles use, in their order; returns how many went.
-pub(super) fn drop_unused_points(surface: &mut Surface) -> u64 {
+pub fn drop_unused_points(surface: &mut Surface) -> u64 {
     const UNUSED: u32 = u32::MAX;
     let mut new_ids = filled(surface.points.len(), UNUSED);
     for v in surface.triangles.iter().flatten() {

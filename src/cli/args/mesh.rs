@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::run::RunArgs;
-use super::{ShapeArgs, SheetArgs};
+use super::{RepairArgs, ShapeArgs, SheetArgs};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -18,6 +18,8 @@ pub struct MeshArgs {
     /// The store to write [default: the surface's name with .tetdb, in the current folder]
     #[arg(short, long, value_name = "STORE")]
     pub output: Option<PathBuf>,
+    #[command(flatten)]
+    pub repair: RepairArgs,
     #[command(flatten)]
     pub sheets: SheetArgs,
     #[command(flatten)]
@@ -47,6 +49,8 @@ pub struct EstimateArgs {
     /// Where the store would be [default: in the current folder]
     #[arg(short, long, value_name = "STORE")]
     pub output: Option<PathBuf>,
+    #[command(flatten)]
+    pub repair: RepairArgs,
     #[command(flatten)]
     pub sheets: SheetArgs,
     #[command(flatten)]

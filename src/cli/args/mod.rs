@@ -20,7 +20,7 @@ pub use run::RunArgs;
 pub use shape::{InsideArgs, ShapeArgs, SizeArgs};
 pub use show::{CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
 pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
-pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs, SheetArgs};
+pub use surface::{CheckArgs, RefineSurfaceArgs, RepairArgs, SampleArgs, SheetArgs};
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 
 /// Fills a closed triangle surface with tetrahedra.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::run::ReadArgs;
-use super::surface::SheetArgs;
+use super::surface::{RepairArgs, SheetArgs};
 use tetdb_engine::api::Share;
 
 #[derive(Debug, clap::Args)]
@@ -51,6 +51,9 @@ pub struct VerifyArgs {
     pub threads: Option<usize>,
     #[command(flatten)]
     pub read: ReadArgs,
+    /// The repair of the surface that --against names.
+    #[command(flatten)]
+    pub repair: RepairArgs,
     /// What was embedded, where --against names the surface.
     #[command(flatten)]
     pub sheets: SheetArgs,

@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
+use tetdb_engine::api::RepairKind;
+
 use super::shape::InsideArgs;
+use super::words::word_of;
 
 /// Sheets inside the surface.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -32,11 +35,19 @@ impl SheetArgs {
     }
 }
 
+/// A repair before anything else.
+#[derive(Debug, clap::Args)]
+pub struct RepairArgs {
+    /// Repair the surface first: resolve divides triangles that cross along their intersections; the others stay as they are
+    #[arg(long, value_name = "HOW", value_parser = word_of::<RepairKind>(&[]))]
+    pub repair: Option<RepairKind>,
+}
+
 /// What is wrong with a surface, and what mesh it allows. Nothing is changed unless --repair is given.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tetdb check part.stl\n  tetdb check part.stl --json\n  tetdb check part.stl --write-bad bad.vtu\n  tetdb check part.stl --embed-points sensors.csv --embed-outside skip\n  \
-    tetdb check part.stl --repair --write fixed.stl\n  tetdb check part.stl --repair --weld 1e-6 --write fixed.stl\n\n\
+    tetdb check part.stl --repair --write fixed.stl\n  tetdb check part.stl --repair --weld 1e-6 --write fixed.stl\n  tetdb check parts.stl --repair=resolve --write united.stl\n\n\
     Exit code 0: the surface can be meshed; 3: it has defects. With --repair this is said of what was written."
 )]
 pub struct CheckArgs {
@@ -50,9 +61,10 @@ pub struct CheckArgs {
     /// Write the defective triangles to this .vtu file, the kind of defect as cell data
     #[arg(long, value_name = "FILE")]
     pub write_bad: Option<PathBuf>,
-    /// Drop triangles without area and repeated ones, divide triangles at T-junctions, turn triangles so that neighbors face the same side
-    #[arg(long, requires = "write")]
-    pub repair: bool,
+    /// Drop triangles without area and repeated ones, divide triangles at T-junctions, turn triangles so that neighbors face the same side;
+    /// --repair=resolve instead divides triangles that cross along their intersections
+    #[arg(long, requires = "write", value_name = "HOW", num_args = 0..=1, require_equals = true, value_parser = word_of::<RepairKind>(&[]))]
+    pub repair: Option<Option<RepairKind>>,
     /// With --repair: first join points not farther apart than this share of the box diagonal
     #[arg(long, value_name = "R", requires = "repair", allow_hyphen_values = true)]
     pub weld: Option<String>,
@@ -73,6 +85,7 @@ pub struct CheckArgs {
     Keys, each with a default:
   balls   count, seed, h      a cube with empty balls of many sizes in it
   box     x, y, z, h          sides of a box
+  broken  kind, count, seed, h  kind is holes, crossings, doubled, cracks, turned, tjunctions or soup
   caps    count, seed         a column with flat ends of many corners, badly cut into triangles
   faults  count, seed, cells, shift  a box with sheets in it that cut each other and end inside
   grains  count, seed, h      disjoint convex polyhedra in a box; mesh them with --regions all
@@ -85,7 +98,7 @@ pub struct CheckArgs {
 h is the length of the edges."
 )]
 pub struct SampleArgs {
-    /// NAME,key=value,... with the names balls, box, caps, faults, grains, knot, needles, shells, sphere, steps, wells
+    /// NAME,key=value,... with the names balls, box, broken, caps, faults, grains, knot, needles, shells, sphere, steps, wells
     #[arg(value_name = "SAMPLE")]
     pub sample: String,
     /// The file to write: .stl (text), .off, .obj or .ply, all exact; - is the standard output

@@ -61,6 +61,7 @@ mod surface_arrays;
 mod surface_limits;
 mod surface_repair;
 mod surface_report;
+mod surface_resolve;
 mod surface_wires;
 #[doc(hidden)]
 pub mod targets;
@@ -107,6 +108,7 @@ pub use surface::{CheckReport, Surface};
 pub use surface_arrays::CellArrays;
 pub use surface_repair::{RepairReport, WELD_SHARE_MAX};
 pub use surface_report::SurfaceReport;
+pub use surface_resolve::{RepairKind, ResolveReport};
 pub use targets::{check_target, inputs_of};
 pub use tasks::Tasks;
 pub use tasks_status::{GatherReport, TaskReport, TaskStage, TaskStatus, task_ranges};

@@ -239,7 +239,7 @@ impl Surface {
             surface::validate(&self.inner).accept()?;
             let options = SizeOptions::parse(Some(&h.to_string()), None, None, None)?;
             (self.inner, _) = refine(&self.inner, &options, &ScratchSpace::boundless())?;
-            self.sources = vec![given(&self.inner)];
+            self.sources = self.copied(&self.inner);
             Ok(self)
         })
     }
@@ -285,7 +285,8 @@ impl Surface {
                 });
                 let is_open = self.sources.iter().any(|s| s.origin == Origin::OpenParts);
                 let first = Origin::SheetsFrom(known.unwrap_or(first));
-                self.sources = vec![given(&self.inner), Source::unmarked(first)];
+                self.sources = self.copied(&self.inner);
+                self.sources.push(Source::unmarked(first));
                 self.sources.extend(is_open.then(|| Source::unmarked(Origin::OpenParts)));
             }
         }
@@ -451,6 +452,7 @@ impl Surface {
             Origin::Points(NamedFile { name, file }) => {
                 self.with_wires(Path::new(file), WireKind::Points, Some(name), scratch)
             }
+            Origin::Resolved(_) => Ok(self.resolved_in(scratch)?.0),
             Origin::OpenParts | Origin::File(_) | Origin::Sample(_) | Origin::Copy => {
                 Ok(self.open_parts_in(scratch)?.0)
             }
@@ -461,6 +463,15 @@ impl Surface {
     pub(super) fn given(inner: surface::Surface) -> Self {
         let source = given(&inner);
         Self::of(inner, vec![source])
+    }
+
+    /// The record of a copy in the store; that crossings were resolved stays on record.
+    pub(super) fn copied(&self, inner: &surface::Surface) -> Vec<Source> {
+        let own = given(inner);
+        let of_copy = |s: &Source| Source { hash: own.hash, ..s.clone() };
+        let mut resolved = self.sources.iter().filter(|s| matches!(s.origin, Origin::Resolved(_)));
+        let resolved = resolved.next().map(of_copy);
+        std::iter::once(own).chain(resolved).collect()
     }
 
     fn of(inner: surface::Surface, sources: Vec<Source>) -> Self {

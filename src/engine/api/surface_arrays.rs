@@ -1,6 +1,5 @@
 //! The vertices, triangles and labels of a surface as arrays, and surfaces from arrays of other cells than triangles.
 
-use super::surface::given;
 use super::{Error, Settings, Surface, guarded};
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{CellBoundary, Note, NoteKind, Seed, SeedKind, SurfaceBuilder};
@@ -147,7 +146,7 @@ impl Surface {
         }
         if !groups.is_empty() {
             self.inner.divide_labels(groups);
-            self.sources = vec![given(&self.inner)];
+            self.sources = self.copied(&self.inner);
         }
         Ok(self)
     }

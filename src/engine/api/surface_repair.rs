@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use tetdb_schema::code::Code;
 
 use super::error::{Error, Remedy};
-use super::surface::{given, refuse_sheets};
+use super::surface::refuse_sheets;
 use super::{Bytes, Settings, Surface, guarded};
 use tetdb_base::storage::attempt;
 use tetdb_base::surface::{Repair, repair, repair_bytes, validate_with};
@@ -93,7 +93,7 @@ impl Surface {
             // Triangles turned while the surface was read count as well.
             done.turned += self.turned;
             self.turned = done.turned;
-            self.sources = vec![given(&self.inner)];
+            self.sources = self.copied(&self.inner);
             let report = RepairReport {
                 weld,
                 weld_distance,

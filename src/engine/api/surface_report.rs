@@ -6,6 +6,7 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 
 use super::suggestions::{Suggestion, suggestions};
+use super::surface_resolve::{ResolveReport, tried};
 use super::{Bytes, Error, Settings, Surface, guarded, predict};
 use crate::pipeline::{MeshOptions, Prepared, least_for};
 use tetdb_base::geom::short;
@@ -20,6 +21,8 @@ use tetdb_io::write;
 /// Above this number of triangles, tetrahedra are estimated only on request. Computing sizes and their integral takes two to three times
 /// as long as the rest of the report.
 const ESTIMATED_MAX: usize = 100_000;
+/// Up to this number of pairs of triangles that touch, resolving them is tried. More take seconds.
+const RESOLVED_MAX: u64 = 20_000;
 /// Above this share of forced tetrahedra, or of triangles with small angles, the report advises better triangles.
 const POOR_SHARE: f64 = 0.01;
 /// Above this ratio of edge lengths, the report mentions the short edges.
@@ -39,6 +42,8 @@ pub struct SurfaceReport<'a> {
     pub boundary_loops: Vec<BoundaryLoop>,
     /// Repairs tried on an open surface, with growing distance; empty for a closed one.
     pub closing: Vec<Closing>,
+    /// What resolving the crossings would do; `None` where there are none, where it fails, and for a large surface.
+    pub resolving: Option<ResolveReport>,
     /// Shapes of the triangles.
     pub fitness: Fitness,
     /// Estimated number of tetrahedra with default sizes. `None` if the surface cannot be meshed, or if it is large and no estimate was
@@ -85,6 +90,13 @@ impl<'a> SurfaceReport<'a> {
         let cap = settings.cap()?;
         let scratch = settings.scratch_space(surface.bytes() as u64)?;
         let validation = attempt(|| validate_with(surface, &scratch))?;
+        let n_crossings = validation.n_intersections;
+        let is_tried = (1..=RESOLVED_MAX).contains(&n_crossings)
+            && surface.n_triangles() <= ESTIMATED_MAX
+            && cap >= 2 * repair_bytes(surface)
+            && !surface.has_sheets()
+            && !surface.has_embedded();
+        let resolving = is_tried.then(|| tried(surface, &scratch)).flatten();
         drop(scratch);
         let fitness = fitness(surface, &validation.closedness);
         let is_estimated =
@@ -110,6 +122,7 @@ impl<'a> SurfaceReport<'a> {
             n_turned,
             boundary_loops: boundary_loops(surface, &validation.closedness),
             closing,
+            resolving,
             fitness,
             tets_expected: prepared.map(|prepared| prepared.estimate.tets()),
             suggestions,
@@ -246,7 +259,7 @@ impl<'a> SurfaceReport<'a> {
             "defects": found.defects.iter().map(|defect| defect_json(defect, surface)).collect::<Vec<_>>(),
             "open_loops": open_loops, "t_junctions": junctions,
             "closing": { "tried": self.closing, "smallest": self.closes().map(|c| c.share) },
-            "fitness": fitness, "advice": self.advice(), "cures": self.suggestions,
+            "resolving": self.resolving, "fitness": fitness, "advice": self.advice(), "cures": self.suggestions,
         })
     }
 }

@@ -9,7 +9,7 @@ use tetdb_schema::source::{NamedFile, Origin, Source};
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::Error;
-use super::surface::{given, halves, source};
+use super::surface::{halves, source};
 use super::{Length, Settings, Surface, guarded};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, attempt};
@@ -210,13 +210,13 @@ impl Surface {
     /// Makes the store keep a copy of the whole surface, in the order in which the copy is read again.
     pub(super) fn keep_all(&mut self, scratch: &ScratchSpace) -> Result<(), Error> {
         if !self.inner.has_sheets() && !self.inner.has_embedded() {
-            self.sources = vec![given(&self.inner)];
+            self.sources = self.copied(&self.inner);
             return Ok(());
         }
         let set = self.inner.embedded_set();
         let mut plain = self.inner.without_embedded();
         let first = plain.sheets_last();
-        self.sources = vec![given(&plain)];
+        self.sources = self.copied(&plain);
         if plain.has_sheets() {
             self.sources.push(Source::unmarked(Origin::SheetsFrom(first)));
         }

@@ -4,11 +4,12 @@
 //! same word gives the same bits on every machine: only IEEE basic operations and square roots are used, and random
 //! numbers come from `random`.
 //!
-//! Every surface, except for its sheets, is closed and without duplicate points. Normals point out of the parts that an
+//! Every surface but `broken`, except for its sheets, is closed and without duplicate points. Normals point out of the parts that an
 //! odd number of shells separates from the outside, so that the signed volume is the volume that the parity rule fills.
 
 mod balls;
 mod boxes;
+mod broken;
 mod build;
 mod caps;
 mod error;

@@ -1,6 +1,7 @@
 //! Parses a word such as `balls,count=1000,h=0.02`.
 
 use super::balls::Balls;
+use super::broken::{Broken, BrokenKind};
 use super::caps::Caps;
 use super::faults::Faults;
 use super::grains::Grains;
@@ -17,8 +18,8 @@ use tetdb_base::geom::Point;
 pub const PREFIX: &str = "sample:";
 /// The samples there are.
 pub const SAMPLES: &[&str] = &[
-    "balls", "box", "caps", "faults", "grains", "knot", "needles", "shells", "sphere", "steps",
-    "wells",
+    "balls", "box", "broken", "caps", "faults", "grains", "knot", "needles", "shells", "sphere",
+    "steps", "wells",
 ];
 
 /// The specification of a sample.
@@ -39,6 +40,8 @@ pub enum SampleKind {
         /// Edge length of the triangles.
         h: f64,
     },
+    /// Holes, crossings and what else keeps a surface from being meshed; see `broken.rs`.
+    Broken(Broken),
     /// A coplanar cap with many vertices, badly triangulated; see `caps.rs`.
     Caps(Caps),
     /// A box with sheets in it; see `faults.rs`.
@@ -87,6 +90,7 @@ impl SampleSpec {
         let kind = match name {
             "balls" => parse_balls(rest)?,
             "box" => parse_box(rest)?,
+            "broken" => parse_broken(rest)?,
             "caps" => parse_caps(rest)?,
             "faults" => parse_faults(rest)?,
             "grains" => parse_grains(rest)?,
@@ -121,6 +125,9 @@ impl SampleSpec {
             }
             SampleKind::Box { sides, h } => {
                 format!("{PREFIX}box,x={},y={},z={},h={h}", sides.x, sides.y, sides.z)
+            }
+            SampleKind::Broken(Broken { kind, count, seed, h }) => {
+                format!("{PREFIX}broken,kind={},count={count},seed={seed},h={h}", kind.word())
             }
             SampleKind::Caps(Caps { count, seed }) => {
                 format!("{PREFIX}caps,count={count},seed={seed}")
@@ -171,6 +178,7 @@ impl SampleSpec {
         match &self.kind {
             SampleKind::Balls(balls) => balls.make(bytes_max),
             SampleKind::Box { sides, h } => boxes::make_box(*sides, *h, bytes_max),
+            SampleKind::Broken(broken) => broken.make(bytes_max),
             SampleKind::Caps(caps) => caps.make(bytes_max),
             SampleKind::Faults(faults) => faults.make(bytes_max),
             SampleKind::Grains(grains) => grains.make(bytes_max),
@@ -199,6 +207,22 @@ fn parse_box(rest: &str) -> Result<SampleKind, SampleError> {
     let sides = Point::new(x, y, keys.length("z", 1.0)?);
     let h = keys.length("h", sides.max_element() / 20.0)?;
     Ok(SampleKind::Box { sides, h })
+}
+
+fn parse_broken(rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new("broken", &["kind", "count", "seed", "h"], rest)?;
+    let kind = match keys.get("kind") {
+        None => BrokenKind::Crossings,
+        Some(word) => {
+            let known = BrokenKind::WORDS.iter().find(|(_, known)| *known == word);
+            let words: Vec<&str> = BrokenKind::WORDS.iter().map(|(_, word)| *word).collect();
+            known.ok_or_else(|| keys.bad("kind", format!("one of {}", words.join(", "))))?.0
+        }
+    };
+    let count = keys.number("count", 8, 1, 1_000_000)?;
+    let seed = keys.number("seed", 1, 0, u64::MAX)?;
+    let h = keys.length("h", 0.25)?;
+    Ok(SampleKind::Broken(Broken { kind, count, seed, h }))
 }
 
 fn parse_caps(rest: &str) -> Result<SampleKind, SampleError> {

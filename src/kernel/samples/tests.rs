@@ -286,6 +286,8 @@ fn the_same_word_gives_the_same_bits() {
         "steps,step=1e-3",
         "needles,holes=2",
         "caps,seed=5",
+        "broken,kind=cracks",
+        "broken,kind=soup,count=3",
     ] {
         let spec = SampleSpec::parse(text).unwrap();
         assert_eq!(SampleSpec::parse(&spec.canonical()).unwrap(), spec);
