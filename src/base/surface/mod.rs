@@ -59,7 +59,7 @@ pub use fitness::{Fitness, fitness};
 pub use orientation::{Orientation, orient_alike, orient_alike_with};
 pub use repair::{Closing, Repair, closing, repair, repair_bytes};
 pub use seeds::{Seed, SeedKind};
-pub use seeker::{Crossing, Seeker};
+pub use seeker::{Crossing, Seeker, nearest_point};
 pub use split::{SplitReport, predict_split, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
 pub use validate::{Validation, validate, validate_with};
