@@ -9,7 +9,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::{input, memory};
 use tetdb_engine::api::targets::check_target;
-use tetdb_engine::api::{Error, Length, OptionsText, Surface, SurfaceRemesh, count, short};
+use tetdb_engine::api::{Error, Length, OptionsText, Surface, SurfaceRemesh, short};
 
 pub fn run(args: &RemeshSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     let sizes = OptionsText {
@@ -47,9 +47,9 @@ pub fn run(args: &RemeshSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     }
     console.note(&format!(
         "wrote {} triangles ({} before) and {} vertices to {}; no point of either surface is farther than {} from the other",
-        count(report.triangles, ""),
-        count(report.triangles_before, ""),
-        count(vertices as u64, ""),
+        report.triangles,
+        report.triangles_before,
+        vertices,
         args.output.display(),
         short(report.distance_bound)
     ));
@@ -57,12 +57,12 @@ pub fn run(args: &RemeshSurfaceArgs, console: &Console) -> Result<u8, Failure> {
         "smallest angle {} degrees ({} before); {} edges divided, {} collapsed, {} flipped, {} moves of vertices; {} curves and {} corners kept",
         short(report.angle),
         short(report.angle_before),
-        count(report.splits, ""),
-        count(report.collapses, ""),
-        count(report.flips, ""),
-        count(report.moves, ""),
-        count(report.curves, ""),
-        count(report.corners, ""),
+        report.splits,
+        report.collapses,
+        report.flips,
+        report.moves,
+        report.curves,
+        report.corners,
     ));
     Ok(0)
 }

@@ -126,10 +126,10 @@ pub struct RemeshSurfaceArgs {
     /// Least edge length asked for [default: twice the tolerance]
     #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub hmin: Option<String>,
-    /// Greatest edge length [default: 10% of the box diagonal]
+    /// Greatest edge length [default: none]
     #[arg(long, value_name = "H", conflicts_with = "hsiz", allow_hyphen_values = true)]
     pub hmax: Option<String>,
-    /// Greatest ratio of neighboring edge lengths [default: 1.3]
+    /// Greatest ratio of neighboring edge lengths [default: 1.4]
     #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
     pub hgrad: Option<String>,
     /// Write even over the surface that is read

@@ -13,6 +13,8 @@ use super::{Error, Length, Settings, Surface, guarded};
 const TOLERANCE_MOST: f64 = 0.1;
 /// Least tolerance as a share of the largest coordinate: below it, the rounding of coordinates decides.
 const TOLERANCE_LEAST: f64 = 1e-9;
+/// Ratio of neighboring edge lengths where none is given: at 1.3 a fifth more triangles, from 1.6 on one tetrahedron in two hundred is poor.
+const GRADATION: f64 = 1.4;
 /// Steps of progress.
 const STEPS: u64 = 1000;
 
@@ -23,11 +25,11 @@ pub struct SurfaceRemesh {
     pub tolerance: Length,
     /// Edges between triangles whose normals differ by more than this angle in degrees are kept. Default: 40.
     pub feature_angle: f64,
-    /// Greatest edge length. Default: a tenth of the box diagonal.
+    /// Greatest edge length. Default: none.
     pub hmax: Option<Length>,
     /// Least edge length asked for. Default: twice the tolerance.
     pub hmin: Option<Length>,
-    /// Greatest ratio of neighboring edge lengths. Default: 1.3.
+    /// Greatest ratio of neighboring edge lengths. Default: 1.4.
     pub hgrad: Option<f64>,
 }
 
@@ -85,7 +87,7 @@ impl SurfaceRemesh {
             feature_cos: self.feature_angle.to_radians().cos(),
             hmax: self.hmax.map_or(f64::INFINITY, |h| h.resolve(diagonal)),
             hmin: self.hmin.map_or(0.0, |h| h.resolve(diagonal)),
-            growth: sizes.gradation().ln(),
+            growth: self.hgrad.unwrap_or(GRADATION).ln(),
         })
     }
 }

@@ -24,7 +24,7 @@ mod sources;
 #[cfg(test)]
 mod tests;
 
-use tetdb_base::geom::{Aabb, IdMap};
+use tetdb_base::geom::{Aabb, IdMap, Point};
 use tetdb_base::storage::{ScratchSpace, filled};
 use tetdb_base::surface::{Surface, SurfaceError};
 
@@ -36,8 +36,6 @@ use sizes::Sizes;
 
 /// Bytes held for a triangle there ever was, with its share of vertices, lists and trees.
 const BYTES_TRIANGLE: u64 = 400;
-/// Lengths are at most this share of the box diagonal where nothing else limits them.
-const MOST: f64 = 1.0;
 /// Lengths are at least this many tolerances where nothing else is asked for; finer triangles would be finer than the surface is known.
 const LEAST: f64 = 2.0;
 
@@ -113,7 +111,7 @@ pub fn remesh(
     let backs = merge_two_sided(&mut plain);
     let diagonal = plain.bounds().diagonal();
     let mut settings = *settings;
-    settings.hmax = settings.hmax.min(MOST * diagonal);
+    settings.hmax = settings.hmax.min(diagonal);
     settings.hmin = if settings.hmin > 0.0 { settings.hmin } else { LEAST * settings.tolerance };
     settings.hmin = settings.hmin.min(settings.hmax);
     let mut mesh = Mesh::new(plain.points.clone(), plain.triangles.clone(), plain.labels.clone());
@@ -216,7 +214,7 @@ fn surface_of(mesh: &Mesh, input: &Surface, backs: &IdMap<u32, [u32; 2]>) -> Sur
     for t in mesh.alive() {
         let triangle = mesh.triangles[t as usize].map(|v| {
             *number.entry(v).or_insert_with(|| {
-                result.points.push(mesh.points[v as usize] + tetdb_base::geom::Point::ZERO);
+                result.points.push(mesh.points[v as usize] + Point::ZERO);
                 result.points.len() as u32 - 1
             })
         });

@@ -19,6 +19,8 @@ const ROUNDS: usize = 5;
 const LAST_ROUNDS: usize = 6;
 /// Triangles below this quality (an angle of about 25 degrees) are poor.
 const POOR: f64 = 0.55;
+/// Triangles below this quality (15 degrees) are divided where nothing else helps.
+const NEEDLE: f64 = 0.4;
 
 /// Calls made between two looks at whether the run is cancelled.
 fn each<T>(items: impl IntoIterator<Item = T>, mut visit: impl FnMut(T)) {
@@ -160,12 +162,17 @@ impl Remesher<'_> {
                 self.mesh.points[e.0 as usize].distance(self.mesh.points[e.1 as usize])
             };
             edges.sort_by(|a, b| length(*a).total_cmp(&length(*b)));
+            let is_needle =
+                q < NEEDLE.to_bits() && length(edges[2]) > 3.0 * self.envelope.tolerance;
             let done = self.flip(edges[2]).is_some()
                 || self.collapse(edges[0], true)
                 || corners.into_iter().any(|v| self.relocate(v))
                 || self.flip(edges[1]).is_some()
                 || self.collapse(edges[1], true);
-            let _ = done;
+            // Kept curves on both sides forbid all that; halves are less flat.
+            if !done && is_needle {
+                self.split(edges[2]);
+            }
         });
         count(&self.report) - count(&report)
     }

@@ -10,15 +10,17 @@ use super::envelope::Envelope;
 use super::mesh::{Mesh, area_normal, cosine};
 use super::sizes::Source;
 
-/// Share of the tolerance that a chord may be off a curve. Chords of triangles lie a third deeper than those of edges; above 0.7 most
+/// Share of the tolerance that a chord may be off a curve. Chords of triangles lie a third deeper than those of edges; above 0.9 most
 /// changes are refused, and far below the triangles are needlessly small.
-pub const CHORD: f64 = 0.6;
+pub const CHORD: f64 = 0.8;
 /// Lengths are at most this many thicknesses: above three, flat tetrahedra fill a plate, and below one they are needlessly many.
 const THICKNESSES: f64 = 2.0;
 /// Lengths are at most this many distances of one kept curve from another on the surface.
-const STRIPS: f64 = 1.5;
+const STRIPS: f64 = 2.0;
 /// Samples of the surface have this distance, as a share of the box diagonal.
 const SPACING: f64 = 0.012;
+/// Opposite sides and other curves are looked for up to this share of the box diagonal.
+const REACH: f64 = 0.3;
 /// Edges in a window at most; so many are all there is to know.
 const WINDOW_MAX: usize = 3_000;
 
@@ -55,6 +57,8 @@ pub fn sources(
 struct Bend {
     ends: [Point; 2],
     angle: f64,
+    /// Width of the narrower triangle.
+    width: f64,
     normal: Point,
 }
 
@@ -73,7 +77,8 @@ fn bends(mesh: &Mesh) -> Vec<Bend> {
         // An area does not say which of two needles is right.
         let normal = (x + y) / (x + y).length();
         if angle.abs() > 1e-3 && normal.is_finite() {
-            all.push(Bend { ends, angle, normal });
+            let width = x.length().min(y.length()) / ends[0].distance(ends[1]);
+            all.push(Bend { ends, angle, width, normal });
         }
     }
     all
@@ -105,7 +110,8 @@ fn curvature(
             let p = a + (b - a) * ((f64::from(k) + 0.5) / f64::from(n));
             if seen.insert(cell_of(p, bend.normal, 8.0 * chord)) {
                 let h = length_at(p, bend.normal, &bends, &tree, chord, diagonal, settings);
-                all.extend(h.map(|h| (p, h)));
+                // Triangles narrower than the flat ones of the input gain nothing.
+                all.extend(h.map(|h| (p, h.max(bend.width))));
             }
         }
         check_cancelled();
@@ -136,7 +142,7 @@ fn length_at(
         let mut n = 0;
         let reach = Point::splat(radius);
         tree.meeting(&Aabb { low: p - reach, high: p + reach }, |i| {
-            let Bend { ends: [a, b], angle, normal: other } = bends[i as usize];
+            let Bend { ends: [a, b], angle, normal: other, .. } = bends[i as usize];
             n += 1;
             if other.dot(normal) > 0.3 {
                 let along = (b - a) / (b - a).length();
@@ -187,7 +193,8 @@ fn thickness(mesh: &Mesh, envelope: &Envelope, diagonal: f64) -> Vec<Source> {
                 let at = |k: u32| (f64::from(k) + 1.0 / 3.0) / f64::from(n);
                 let p = a + (b - a) * at(i) + (c - a) * at(j);
                 if normal.is_finite() && seen.insert(cell_of(p, normal, 0.5 * spacing)) {
-                    let found = envelope.thickness(p, -normal, envelope.tolerance, 0.2 * diagonal);
+                    let found =
+                        envelope.thickness(p, -normal, envelope.tolerance, REACH * diagonal);
                     all.extend(found.map(|d| (p, THICKNESSES * d)));
                 }
             }
@@ -220,7 +227,7 @@ fn strips(
     let mut all = Vec::new();
     for &(k, at, p) in &samples {
         let mut radius = 2.0 * envelope.tolerance;
-        while radius < 0.1 * diagonal {
+        while radius < REACH * diagonal {
             let reach = Point::splat(radius);
             let mut best: Option<(f64, u32)> = None;
             tree.meeting(&Aabb { low: p - reach, high: p + reach }, |i| {
