@@ -46,6 +46,7 @@ const RUNS: [(&str, &[&str]); 16] = [
     ("compare", &["compare a.tetdb a.tetdb"]),
     ("export", &["export a.tetdb a.vtu a.npy", "export a.tetdb a.json"]),
     ("refine-surface", &["refine-surface sphere.stl fine.stl --hsiz 0.1"]),
+    ("remesh-surface", &["remesh-surface sphere.stl even.stl --tolerance 1%"]),
     (
         "query",
         &[

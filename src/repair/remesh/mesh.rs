@@ -60,6 +60,8 @@ pub struct Mesh {
     pub features: IdMap<EdgeKey, Span>,
     /// Triangles of each label.
     pub n_of_label: Vec<u32>,
+    /// Numbers of removed triangles, for those to come.
+    free: Vec<u32>,
 }
 
 impl Mesh {
@@ -80,6 +82,7 @@ impl Mesh {
             labels,
             around,
             n_of_label,
+            free: Vec::new(),
         }
     }
 
@@ -154,10 +157,19 @@ impl Mesh {
 
     /// Adds a triangle.
     pub fn add(&mut self, triangle: [u32; 3], label: u32) -> u32 {
-        let t = self.triangles.len() as u32;
-        self.triangles.push(triangle);
-        self.labels.push(label);
-        self.is_alive.push(true);
+        let t = match self.free.pop() {
+            Some(t) => {
+                let i = t as usize;
+                (self.triangles[i], self.labels[i], self.is_alive[i]) = (triangle, label, true);
+                t
+            }
+            None => {
+                self.triangles.push(triangle);
+                self.labels.push(label);
+                self.is_alive.push(true);
+                self.triangles.len() as u32 - 1
+            }
+        };
         triangle.iter().for_each(|&v| self.around[v as usize].push(t));
         self.n_of_label[label as usize] += 1;
         t
@@ -169,6 +181,7 @@ impl Mesh {
             self.around[v as usize].retain(|&s| s != t);
         }
         self.is_alive[t as usize] = false;
+        self.free.push(t);
         self.n_of_label[self.labels[t as usize] as usize] -= 1;
     }
 

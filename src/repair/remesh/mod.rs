@@ -26,7 +26,7 @@ mod tests;
 
 use tetdb_base::geom::{Aabb, IdMap, Point};
 use tetdb_base::storage::{ScratchSpace, filled};
-use tetdb_base::surface::{Surface, SurfaceError};
+use tetdb_base::surface::{Surface, SurfaceError, predict_split};
 
 use change::Remesher;
 use envelope::Envelope;
@@ -36,6 +36,8 @@ use sizes::Sizes;
 
 /// Bytes held for a triangle there ever was, with its share of vertices, lists and trees.
 const BYTES_TRIANGLE: u64 = 400;
+/// A prediction below this share of the true number never refuses what would fit.
+const PREDICTION_LEAST: f64 = 0.5;
 /// Lengths are at least this many tolerances where nothing else is asked for; finer triangles would be finer than the surface is known.
 const LEAST: f64 = 2.0;
 
@@ -91,7 +93,7 @@ pub struct RemeshReport {
 /// that there ever is. A cancelled run unwinds ([`attempt`](tetdb_base::storage::attempt)).
 ///
 /// # Errors
-/// [`SurfaceError::Memory`] if the input does not fit, [`SurfaceError::TooLarge`] if lengths ask for more triangles than fit.
+/// [`SurfaceError::Memory`] if the input does not fit, [`SurfaceError::SplitMemory`] if lengths ask for more triangles than fit.
 pub fn remesh(
     surface: &Surface,
     settings: &RemeshSettings,
@@ -121,6 +123,10 @@ pub fn remesh(
     let envelope = Envelope::new(&plain, settings.tolerance * (1.0 - 1e-6), scratch);
     let sources = sources::sources(&mesh, &chains, &envelope, &settings, scratch);
     let sizes = Sizes::new(sources, settings.growth, [settings.hmin, settings.hmax], scratch);
+    let n = predict_split(&plain, &|p| sizes.at(p));
+    if PREDICTION_LEAST * n > triangles_max as f64 {
+        return Err(too_many(n as u64, bytes_max));
+    }
     let mut octree = Octree::new(plain.bounds());
     for t in 0..mesh.triangles.len() as u32 {
         octree.insert(t, Aabb::around(mesh.corners(t)));
@@ -136,12 +142,18 @@ pub fn remesh(
     };
     let mut remesher =
         Remesher { mesh, wanted, octree, envelope, chains, sizes, settings: &settings, report };
-    remesher.run(triangles_max, progress)?;
+    if !remesher.run(triangles_max, progress) {
+        return Err(too_many(triangles_max as u64, bytes_max));
+    }
     let result = surface_of(&remesher.mesh, &plain, &backs);
     let mut report = remesher.report;
     report.triangles = result.n_triangles() as u64;
     report.angle = least_angle(&result);
     Ok((result, report))
+}
+
+fn too_many(triangles: u64, bytes_max: u64) -> SurfaceError {
+    SurfaceError::SplitMemory { bytes_max, bytes: triangles * BYTES_TRIANGLE, triangles }
 }
 
 /// Smallest angle in degrees.

@@ -4,7 +4,6 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use tetdb_base::storage::check_cancelled;
-use tetdb_base::surface::SurfaceError;
 
 use super::change::Remesher;
 use super::mesh::{EdgeKey, edge, quality};
@@ -31,21 +30,16 @@ fn each<T>(items: impl IntoIterator<Item = T>, mut visit: impl FnMut(T)) {
 }
 
 impl Remesher<'_> {
-    /// Runs all passes. `progress` gets the share that is done.
-    ///
-    /// # Errors
-    /// More triangles than `triangles_max`.
-    pub fn run(
-        &mut self,
-        triangles_max: usize,
-        progress: &dyn Fn(f64),
-    ) -> Result<(), SurfaceError> {
+    /// Runs all passes; false if there would be more triangles than `triangles_max`. `progress` gets the share that is done.
+    pub fn run(&mut self, triangles_max: usize, progress: &dyn Fn(f64)) -> bool {
         self.flips();
         for round in 0..ROUNDS {
             progress(round as f64 / (ROUNDS + 2) as f64);
             self.collapses();
             self.flips();
-            self.splits(triangles_max)?;
+            if !self.splits(triangles_max) {
+                return false;
+            }
             self.flips();
             self.collapses();
             self.flips();
@@ -58,10 +52,11 @@ impl Remesher<'_> {
             }
         }
         progress(1.0);
-        Ok(())
+        true
     }
 
-    fn splits(&mut self, triangles_max: usize) -> Result<(), SurfaceError> {
+    /// Divides long edges, the longest first; false if there would be too many triangles.
+    fn splits(&mut self, triangles_max: usize) -> bool {
         let mut heap: BinaryHeap<(u64, Reverse<EdgeKey>)> = BinaryHeap::new();
         let consider = |this: &Self, heap: &mut BinaryHeap<_>, e: EdgeKey| {
             let length = this.relative_length(e);
@@ -79,7 +74,7 @@ impl Remesher<'_> {
                 continue;
             }
             if self.mesh.triangles.len() > triangles_max {
-                return Err(SurfaceError::TooLarge { what: "triangles", limit: triangles_max });
+                return false;
             }
             let Some(m) = self.split(e) else { continue };
             // Opposite edges flip at once: halves of needles would be divided for ever else.
@@ -95,7 +90,7 @@ impl Remesher<'_> {
                 consider(self, &mut heap, e);
             }
         }
-        Ok(())
+        true
     }
 
     fn collapses(&mut self) {

@@ -291,5 +291,5 @@ fn a_surface_that_does_not_fit_is_refused() {
     let scratch = ScratchSpace::new(1 << 20, std::env::temp_dir());
     let fine = RemeshSettings { hmax: 1e-3, hmin: 1e-3, ..settings(0.01) };
     let refused = remesh(&lump(9, 1), &fine, &scratch, &|_| ());
-    assert!(matches!(refused, Err(SurfaceError::TooLarge { .. })), "{refused:?}");
+    assert!(matches!(refused, Err(SurfaceError::SplitMemory { .. })), "{refused:?}");
 }
