@@ -1,6 +1,6 @@
 //! One change of the surface: triangles that go, triangles that come, and the checks between.
 
-use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::geom::{Aabb, Point, orient};
 use tetdb_base::surface::contact;
 
 use super::chains::Chain;
@@ -106,11 +106,34 @@ impl Remesher<'_> {
 
     fn is_allowed(&self, change: &Change) -> bool {
         let corners = self.corners_added(change);
-        corners.iter().all(|t| quality(*t) > 1e-9)
-            && self.keeps_labels(change)
-            && (change.is_division || self.keeps_normals(change, &corners))
-            && self.is_free_of_contacts(change, &corners)
-            && (change.is_division || self.is_within_tolerance(change, &corners))
+        if !corners.iter().all(|t| quality(*t) > 1e-9) || !self.keeps_labels(change) {
+            return false;
+        }
+        if change.is_division {
+            return self.is_free_of_contacts(change, &corners);
+        }
+        self.keeps_normals(change, &corners)
+            && (self.is_same_plane_figure(change, &corners)
+                || self.is_free_of_contacts(change, &corners)
+                    && self.is_within_tolerance(change, &corners))
+    }
+
+    /// Returns whether old and new triangles fill the same figure of one plane, by exact signs: then no distance changes, and nothing is
+    /// touched that was not.
+    fn is_same_plane_figure(&self, change: &Change, corners: &[[Point; 3]]) -> bool {
+        let mut old = change.removed.iter().map(|&t| self.mesh.corners(t));
+        let Some(first) = old.next() else { return false };
+        if !change.features_removed.is_empty() || quality(first) < NEEDLE {
+            return false;
+        }
+        let normal = area_normal(first);
+        let [a, b, c] = first;
+        let is_in_plane = |p: Point| {
+            (0..3).any(|k| a[k] == b[k] && b[k] == c[k] && c[k] == p[k])
+                || orient(a, b, c, p) == 0.0
+        };
+        old.chain(corners.iter().copied())
+            .all(|t| t.into_iter().all(is_in_plane) && area_normal(t).dot(normal) > 0.0)
     }
 
     fn keeps_labels(&self, change: &Change) -> bool {
@@ -187,15 +210,19 @@ impl Remesher<'_> {
         for (i, p) in corners.iter().enumerate() {
             let ids = change.added[i].0;
             for (q, (other, _)) in corners[..i].iter().zip(&change.added) {
-                if is_same(&ids, other) || contact(*p, ids, *q, *other).is_some() {
+                if is_same(&ids, other)
+                    || !is_apart(p, ids, q, *other) && contact(*p, ids, *q, *other).is_some()
+                {
                     return false;
                 }
             }
+            let touch = |q: &[Point; 3], other: [u32; 3]| {
+                !is_apart(p, ids, q, other) && contact(*p, ids, *q, other).is_some()
+            };
             let touches = self.octree.meeting(&Aabb::around(*p), |t| {
                 let other = self.mesh.triangles[t as usize];
                 !change.removed.contains(&t)
-                    && (is_same(&ids, &other)
-                        || contact(*p, ids, self.mesh.corners(t), other).is_some())
+                    && (is_same(&ids, &other) || touch(&self.mesh.corners(t), other))
             });
             if touches {
                 return false;
@@ -232,4 +259,27 @@ impl Remesher<'_> {
         }
         true
     }
+}
+
+/// Separations below this share of the longest difference are left to exact signs.
+const CLEARLY: f64 = 1e-9;
+
+/// Returns whether a plane through an edge of either triangle clearly separates them but for the vertices they share. Quick, and enough for
+/// most triangles of one plane, where exact signs are slow.
+fn is_apart(p: &[Point; 3], p_ids: [u32; 3], q: &[Point; 3], q_ids: [u32; 3]) -> bool {
+    let by_edge = |p: &[Point; 3], p_ids: [u32; 3], q: &[Point; 3], q_ids: [u32; 3]| {
+        let normal = area_normal(*p);
+        (0..3).any(|k| {
+            let (a, b, c) = (k, (k + 1) % 3, (k + 2) % 3);
+            let side = (p[b] - p[a]).cross(normal);
+            let least = CLEARLY * side.length();
+            side.dot(p[c] - p[a]) < 0.0
+                && (0..3).all(|j| {
+                    let x = q[j] - p[a];
+                    let is_end = q_ids[j] == p_ids[a] || q_ids[j] == p_ids[b];
+                    is_end || side.dot(x) > least * x.length().max((p[b] - p[a]).length())
+                })
+        })
+    };
+    by_edge(p, p_ids, q, q_ids) || by_edge(q, q_ids, p, p_ids)
 }
