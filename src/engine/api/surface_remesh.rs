@@ -82,11 +82,18 @@ impl SurfaceRemesh {
             );
             return refuse(message, "allow more, or move the surface to the origin");
         }
+        let [hmax, hmin] = [self.hmax, self.hmin].map(|h| h.map(|h| h.resolve(diagonal)));
+        if let (Some(least), Some(most)) = (hmin, hmax)
+            && least > most
+        {
+            let message = format!("the least length {least} is above the greatest {most}");
+            return refuse(message, "ask for a least length, hmin, below the greatest");
+        }
         Ok(RemeshSettings {
             tolerance,
             feature_cos: self.feature_angle.to_radians().cos(),
-            hmax: self.hmax.map_or(f64::INFINITY, |h| h.resolve(diagonal)),
-            hmin: self.hmin.map_or(0.0, |h| h.resolve(diagonal)),
+            hmax: hmax.unwrap_or(f64::INFINITY),
+            hmin: hmin.unwrap_or(0.0),
             growth: self.hgrad.unwrap_or(GRADATION).ln(),
         })
     }

@@ -8,8 +8,8 @@ use super::envelope::{Envelope, box_around};
 use super::mesh::{EdgeKey, Mesh, Span, area_normal, cosine, edge, quality};
 use super::octree::Octree;
 use super::region::{Region, is_covered};
+use super::settings::{RemeshReport, RemeshSettings};
 use super::sizes::Sizes;
-use super::{RemeshReport, RemeshSettings};
 
 /// Below this quality a triangle's normal says nothing: about half a degree.
 const NEEDLE: f64 = 0.02;
@@ -91,7 +91,10 @@ impl Remesher<'_> {
         if let Some((v, p)) = change.moved {
             mesh.points[v as usize] = p;
             self.wanted.resize(mesh.points.len(), 0.0);
-            self.wanted[v as usize] = self.sizes.at(p);
+            let others = change.added.iter().flat_map(|(t, _)| *t).filter(|&u| u != v);
+            let known = others.map(|u| (mesh.points[u as usize], self.wanted[u as usize]));
+            let h = self.sizes.near(p, known);
+            self.wanted[v as usize] = h;
         }
         for key in &change.features_removed {
             mesh.features.remove(key);

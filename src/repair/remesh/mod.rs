@@ -5,7 +5,7 @@
 //! the tolerance either way ([`envelope`]), folds the surface, lets triangles touch, or takes the last triangle of a label. Kept
 //! curves ([`chains`]) stay within the tolerance of their own input; corners stay where they are.
 //!
-//! Reading order: `region` (convex sets around a triangle), `envelope` (the distance bound), `octree`, `mesh`, `chains`, `sizes` and
+//! Reading order: `settings`, `region` (convex sets around a triangle), `envelope` (the distance bound), `octree`, `mesh`, `chains`, `sizes` and
 //! `sources` (wanted lengths), `change` (one replacement and its checks), `operations`, `passes`.
 //!
 //! Is not: repair. The input must be valid.
@@ -18,6 +18,7 @@ mod octree;
 mod operations;
 mod passes;
 mod region;
+mod settings;
 mod sizes;
 mod sources;
 
@@ -32,6 +33,7 @@ use change::Remesher;
 use envelope::Envelope;
 use mesh::{EdgeKey, Mesh, area_normal, cosine, smallest_angle};
 use octree::Octree;
+pub use settings::{RemeshReport, RemeshSettings};
 use sizes::Sizes;
 
 /// Bytes held for a triangle there ever was, with its share of vertices, lists and trees.
@@ -44,48 +46,6 @@ const LEAST: f64 = 2.0;
 /// Edges this many times longer than the triangles at them are wide are sides of facets, as of a cylinder. Those of an even mesh are no curves,
 /// however they bend.
 const FACET: f64 = 2.0;
-
-/// What to do. Lengths are in input units.
-#[derive(Clone, Copy, Debug)]
-pub struct RemeshSettings {
-    /// Greatest distance of the old surface from the new one, and of the new from the old.
-    pub tolerance: f64,
-    /// Cosine of the angle between normals from which an edge is kept.
-    pub feature_cos: f64,
-    /// Greatest length of edges; infinite for none.
-    pub hmax: f64,
-    /// Least length of edges; 0 for a share of the tolerance.
-    pub hmin: f64,
-    /// Growth of lengths with the distance.
-    pub growth: f64,
-}
-
-/// What was done.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct RemeshReport {
-    /// Triangles of the input.
-    pub triangles_before: u64,
-    /// Triangles of the result.
-    pub triangles: u64,
-    /// Edges divided.
-    pub splits: u64,
-    /// Edges collapsed.
-    pub collapses: u64,
-    /// Edges flipped.
-    pub flips: u64,
-    /// Vertices moved.
-    pub moves: u64,
-    /// Bound on the distance of any point of either surface from the other, in input units.
-    pub distance_bound: f64,
-    /// Smallest angle of the input in degrees.
-    pub angle_before: f64,
-    /// Smallest angle of the result in degrees.
-    pub angle: f64,
-    /// Kept curves: edges between faces, borders of labels, edges with more than two triangles.
-    pub curves: u64,
-    /// Vertices that stayed because kept curves end there or bend sharply.
-    pub corners: u64,
-}
 
 /// Remeshes a valid surface without sheets or embedded parts.
 ///
@@ -116,6 +76,10 @@ pub fn remesh(
     settings.hmax = settings.hmax.min(diagonal);
     settings.hmin = if settings.hmin > 0.0 { settings.hmin } else { LEAST * settings.tolerance };
     settings.hmin = settings.hmin.min(settings.hmax);
+    let n = predict_split(&plain, &|_| settings.hmax);
+    if PREDICTION_LEAST * n > triangles_max as f64 {
+        return Err(too_many(n as u64, bytes_max));
+    }
     let mut mesh = Mesh::new(plain.points.clone(), plain.triangles.clone(), plain.labels.clone());
     let kept = kept_edges(&mesh, &settings);
     let chains = chains::build(&mut mesh, &kept, settings.feature_cos);
@@ -123,10 +87,6 @@ pub fn remesh(
     let envelope = Envelope::new(&plain, settings.tolerance * (1.0 - 1e-6), scratch);
     let sources = sources::sources(&mesh, &chains, &envelope, &settings, scratch);
     let sizes = Sizes::new(sources, settings.growth, [settings.hmin, settings.hmax], scratch);
-    let n = predict_split(&plain, &|p| sizes.at(p));
-    if PREDICTION_LEAST * n > triangles_max as f64 {
-        return Err(too_many(n as u64, bytes_max));
-    }
     let mut octree = Octree::new(plain.bounds());
     for t in 0..mesh.triangles.len() as u32 {
         octree.insert(t, Aabb::around(mesh.corners(t)));

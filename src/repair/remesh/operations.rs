@@ -148,7 +148,8 @@ impl Remesher<'_> {
     /// Returns whether a collapse makes an edge that would be divided again; not where it removes a needle.
     fn makes_long(&self, gone: u32, stays: u32, p: Point, before: f64) -> bool {
         let longest = if before < 0.1 { 2.0 } else { 4.0 / 3.0 };
-        let h = self.sizes.at(p);
+        let known = [gone, stays].map(|v| (self.mesh.points[v as usize], self.wanted[v as usize]));
+        let h = self.sizes.near(p, known.into_iter());
         let neighbors = self.mesh.neighbors(gone).into_iter().filter(|&v| v != stays);
         neighbors.into_iter().any(|v| {
             let mean = 0.5 * (h + self.wanted[v as usize]);

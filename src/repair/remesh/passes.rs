@@ -136,7 +136,7 @@ impl Remesher<'_> {
     /// Tries everything at poor triangles, the poorest first; returns the number of changes.
     fn poor(&mut self) -> u64 {
         let report = self.report;
-        let count = |r: &super::RemeshReport| r.flips + r.collapses + r.moves + r.splits;
+        let count = |r: &super::settings::RemeshReport| r.flips + r.collapses + r.moves + r.splits;
         let mut poor: Vec<(u64, u32)> = Vec::new();
         for t in self.mesh.alive() {
             let q = quality(self.mesh.corners(t));

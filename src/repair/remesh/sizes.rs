@@ -28,7 +28,7 @@ impl Sizes {
         [least, most]: [f64; 2],
         scratch: &ScratchSpace,
     ) -> Self {
-        let sources = thinned(sources, growth);
+        let sources = thinned(sources);
         let bounds = Aabb::around(sources.iter().map(|s| s.0));
         let box_of = |i: u32| Aabb::around([sources[i as usize].0]);
         let tree = (!sources.is_empty())
@@ -54,7 +54,13 @@ impl Sizes {
 
     /// The wanted length at a place.
     pub fn at(&self, p: Point) -> f64 {
-        let mut best = self.most;
+        self.near(p, std::iter::empty())
+    }
+
+    /// The same, quicker with places nearby whose lengths are known.
+    pub fn near(&self, p: Point, known: impl Iterator<Item = Source>) -> f64 {
+        let bounds = known.map(|(q, h)| h + self.growth * p.distance(q));
+        let mut best = bounds.fold(self.most, f64::min);
         let Some(tree) = &self.tree else { return best };
         let bound = |level: usize, node: usize| {
             let b = tree.levels[level].get(node);
@@ -83,11 +89,11 @@ impl Sizes {
 }
 
 /// The sources without those that another one in the same small cell makes needless.
-fn thinned(mut sources: Vec<Source>, growth: f64) -> Vec<Source> {
+fn thinned(mut sources: Vec<Source>) -> Vec<Source> {
     sources.retain(|s| s.1.is_finite() && s.1 > 0.0);
     let cell = |&(p, h): &Source| {
         let level = h.log2().floor();
-        let size = level.exp2() * growth.min(0.5);
+        let size = level.exp2() * 0.5;
         let [x, y, z] = (p / size).floor().to_array();
         [level as i64, x as i64, y as i64, z as i64]
     };

@@ -4,10 +4,10 @@ use tetdb_base::geom::{Aabb, IdSet, Point, mix};
 use tetdb_base::storage::{ScratchSpace, check_cancelled};
 use tetdb_base::surface::BoxTree;
 
-use super::RemeshSettings;
 use super::chains::Chain;
 use super::envelope::Envelope;
 use super::mesh::{Mesh, area_normal, cosine};
+use super::settings::RemeshSettings;
 use super::sizes::Source;
 
 /// Share of the tolerance that a chord may be off a curve. Chords of triangles lie a third deeper than those of edges; above 0.9 most
