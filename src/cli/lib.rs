@@ -24,6 +24,7 @@ mod query_rows;
 #[cfg(feature = "mpi")]
 mod ranks;
 mod refine_surface;
+mod remesh_surface;
 mod report;
 mod resaturate;
 mod resaturate_sizes;
@@ -202,6 +203,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Digest(args) => digest::run(args, console),
         Command::Export(args) => export::run(args, console),
         Command::RefineSurface(args) => refine_surface::run(args, console),
+        Command::RemeshSurface(args) => remesh_surface::run(args, console),
         Command::Snapshot(args) => snapshot::run(args, console),
         Command::Report(args) => report::run(args, console),
         Command::Sample(args) => sample::run(args, console),

@@ -13,6 +13,9 @@ pub fn names(command: &Command) -> Vec<(&'static str, String)> {
         Command::RefineSurface(a) => {
             (None, plain(std::slice::from_ref(&a.surface), &SheetArgs::default()))
         }
+        Command::RemeshSurface(a) => {
+            (None, plain(std::slice::from_ref(&a.surface), &SheetArgs::default()))
+        }
         Command::Resume(a) => (Some(a.store.clone()), None),
         Command::Plan(a) => (Some(a.store.clone()), None),
         Command::Work(a) => (Some(a.store.clone()), None),

@@ -19,6 +19,7 @@ mod point_files;
 mod query;
 mod refined;
 mod regions;
+mod remeshed;
 mod report;
 mod resaturate;
 mod resolve;

@@ -62,7 +62,7 @@ pub use repair::{
     replace_triangles,
 };
 pub use seeds::{Seed, SeedKind};
-pub use seeker::{Crossing, Seeker};
+pub use seeker::{Crossing, Seeker, nearest_point};
 pub use split::{SplitReport, predict_split, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
 pub use validate::{PAIRS_MAX, Validation, pairs_that_touch, validate, validate_with};

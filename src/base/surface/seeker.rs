@@ -225,7 +225,7 @@ fn distance2(b: &Aabb, p: Point) -> f64 {
 }
 
 /// The point of a triangle nearest to `p`: on its face, an edge or at a corner.
-pub(super) fn nearest_point([a, b, c]: [Point; 3], p: Point) -> Point {
+pub fn nearest_point([a, b, c]: [Point; 3], p: Point) -> Point {
     let normal = (b - a).cross(c - a);
     let beyond = |from: Point, to: Point| (to - from).cross(p - from).dot(normal);
     let sides = [beyond(b, c), beyond(c, a), beyond(a, b)];

@@ -20,7 +20,9 @@ pub use run::RunArgs;
 pub use shape::{InsideArgs, ShapeArgs, SizeArgs};
 pub use show::{CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
 pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
-pub use surface::{CheckArgs, RefineSurfaceArgs, RepairArgs, SampleArgs, SheetArgs};
+pub use surface::{
+    CheckArgs, RefineSurfaceArgs, RemeshSurfaceArgs, RepairArgs, SampleArgs, SheetArgs,
+};
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 
 /// Fills a closed triangle surface with tetrahedra.
@@ -103,6 +105,11 @@ pub enum Command {
     ///
     /// Edges longer than wanted are halved, no triangle leaves its place.
     RefineSurface(RefineSurfaceArgs),
+    /// Write a surface of even triangles within a tolerance of the given one
+    ///
+    /// Needles vanish. Edges between faces, borders of labels and corners are kept; no point of either surface is farther than the
+    /// tolerance from the other.
+    RemeshSurface(RemeshSurfaceArgs),
     /// Draw a cut through the mesh, or its surfaces in space
     ///
     /// A cut is seen from the side its direction points to. Only what is seen is read.
@@ -139,6 +146,7 @@ impl Command {
             Self::Compare(a) => a.read.json,
             Self::Export(a) => a.read.json,
             Self::RefineSurface(a) => a.json,
+            Self::RemeshSurface(a) => a.json,
             Self::Snapshot(a) => a.read.json,
             Self::Report(a) => a.read.json,
             Self::Sample(a) => a.json,

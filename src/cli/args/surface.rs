@@ -1,4 +1,4 @@
-//! What can be typed behind `check`, `refine-surface` and `sample`.
+//! What can be typed behind `check`, `refine-surface`, `remesh-surface` and `sample`.
 
 use std::path::PathBuf;
 
@@ -107,6 +107,47 @@ pub struct SampleArgs {
     /// With -o -: stl, off, obj or ply [default: stl]
     #[arg(long, value_name = "FORMAT")]
     pub format: Option<String>,
+    /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A surface of even triangles within a tolerance of the given one.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb remesh-surface part.stl even.stl\n  tetdb remesh-surface part.stl even.obj --tolerance 0.02% --hsiz 2%\n  tetdb mesh even.stl -o part.tetdb"
+)]
+pub struct RemeshSurfaceArgs {
+    /// A surface file, or a sample
+    #[arg(value_name = "IN")]
+    pub surface: String,
+    /// The file to write: .stl (text), .off, .obj or .ply, all exact
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// Greatest distance of either surface from the other: a length, or a share of the box diagonal
+    #[arg(long, value_name = "DIST", default_value = "0.05%", allow_hyphen_values = true)]
+    pub tolerance: String,
+    /// Edges that bend by more degrees than this are kept as curves
+    #[arg(long, value_name = "DEGREES", default_value_t = 40.0, allow_hyphen_values = true)]
+    pub feature_angle: f64,
+    /// Wanted edge length: a length, or 1% of the box diagonal; shorter where curvature or thickness ask for that
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
+    pub hsiz: Option<String>,
+    /// Least edge length asked for [default: twice the tolerance]
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
+    pub hmin: Option<String>,
+    /// Greatest edge length [default: none]
+    #[arg(long, value_name = "H", conflicts_with = "hsiz", allow_hyphen_values = true)]
+    pub hmax: Option<String>,
+    /// Greatest ratio of neighboring edge lengths [default: 1.4]
+    #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
+    pub hgrad: Option<String>,
+    /// Write even over the surface that is read
+    #[arg(long)]
+    pub force: bool,
     /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,

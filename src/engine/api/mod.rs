@@ -9,7 +9,7 @@
 //! | modules | subject |
 //! |---|---|
 //! | `surface`, `surface_arrays`, `surface_wires` | the input surface; embedded sheets, edges and points |
-//! | `surface_limits`, `surface_repair`, `defects`, `surface_report`, `suggestions` | calls within a memory limit; repairs; reports |
+//! | `surface_limits`, `surface_repair`, `surface_remesh`, `defects`, `surface_report`, `suggestions` | calls within a memory limit; repairs; reports |
 //! | `sizes`, `field_arrays`, `options` | wanted edge lengths and other options of a mesh |
 //! | `settings`, `memory` | memory, threads, cancelling, progress |
 //! | `mesher`, `prediction`, `resume` | a new store; predictions; interrupted runs |
@@ -59,6 +59,7 @@ mod suggestions;
 mod surface;
 mod surface_arrays;
 mod surface_limits;
+mod surface_remesh;
 mod surface_repair;
 mod surface_report;
 mod surface_resolve;
@@ -106,6 +107,7 @@ pub use store::{Store, Summary};
 pub use suggestions::Suggestion;
 pub use surface::{CheckReport, Surface};
 pub use surface_arrays::CellArrays;
+pub use surface_remesh::SurfaceRemesh;
 pub use surface_repair::{RepairReport, WELD_SHARE_MAX};
 pub use surface_report::SurfaceReport;
 pub use surface_resolve::{RepairKind, ResolveReport};
@@ -123,6 +125,7 @@ pub use tetdb_io::read::{PointColumns, PointTable, read_seeds};
 pub use tetdb_io::write::SurfaceWritten;
 pub use tetdb_kernel::samples::PREFIX as SAMPLE_PREFIX;
 pub use tetdb_kernel::sizing::SizeWarning;
+pub use tetdb_repair::remesh::RemeshReport as SurfaceRemeshReport;
 pub use tetdb_schema::catalog::{QualityRow, StoreState};
 pub use tetdb_schema::code::Code;
 pub use tetdb_schema::labels::LabelSet;
