@@ -76,6 +76,9 @@ pub(super) struct InZone<'a> {
 /// size may grow on the way.
 const REACH: f64 = 1.3 * (WIDTH_MIN + WIDTH_NOISE);
 
+/// Growth of lengths from a zone outwards. Tetrahedra that reach from a zone far beyond it would be put off by all blocks.
+const COARSE_SLOPE: f64 = 0.5;
+
 impl PlacementRule for InZone<'_> {
     fn is_partial(&self) -> bool {
         true
@@ -100,6 +103,11 @@ impl PlacementRule for InZone<'_> {
         let near = a + (b - a) * surface.nearest(a, b);
         let h = (self.h)(near);
         surface.band(a, b, REACH * h)
+    }
+
+    fn coarse_length(&self, p: Point, h: f64) -> f64 {
+        let beyond = self.zone.surface.distance(p).abs() - (WIDTH_MIN + WIDTH_NOISE) * h;
+        h.max(COARSE_SLOPE * beyond)
     }
 
     fn admits(&self, p: Point, h: f64) -> bool {

@@ -5,8 +5,11 @@ use tetdb_schema::page::NONE;
 use super::brick::{Bricks, SLOT_BITS, SLOT_MASK, Slot};
 use super::flat::Vertex;
 use super::partition::KdPartition;
+use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
-use crate::mesh::{FaceRef, Mesh, dense, sparse};
+use crate::mesh::{FaceRef, Mesh, Tet, dense, sparse};
+use crate::refine::Field;
+use tetdb_base::geom::mix;
 use tetdb_base::storage::{Pages, StorageError, raise};
 
 /// A slot of a brick in one word of the scratch map. Bricks are fewer than the bits left.
@@ -29,8 +32,14 @@ fn next_slot(counts: &mut [u32], brick: u32) -> Slot {
     Slot { brick, slot }
 }
 
-/// Fills empty bricks with a mesh. Coarse vertices keep their id in their note. Effects: the scratch map is used up.
-pub(super) fn to_bricks<P: Pages>(mesh: &mut Mesh<P>, partition: &KdPartition, bricks: &Bricks) {
+/// Fills empty bricks with a mesh. Coarse vertices keep their id in their note. What lies beyond the field's place counts as examined.
+/// Effects: the scratch map is used up.
+pub(super) fn to_bricks<P: Pages>(
+    mesh: &mut Mesh<P>,
+    field: &Field,
+    partition: &KdPartition,
+    bricks: &Bricks,
+) {
     let n_vertices = dense(mesh.vertex_ids_end());
     let n_tets = dense(mesh.tet_ids_end());
     mesh.reset_scratch(n_vertices + n_tets, NONE);
@@ -61,10 +70,14 @@ pub(super) fn to_bricks<P: Pages>(mesh: &mut Mesh<P>, partition: &KdPartition, b
             mesh.set_scratch(n_vertices + k, packed(to));
         }
     }
+    let mut unmatched = 0;
     for k in 0..n_tets {
         let mut tet = mesh.tet(sparse(k));
         if !tet.is_live() {
             continue;
+        }
+        for face in (0..4).map(|i| FaceRef::new(sparse(k), i)) {
+            unmatched ^= pair_code(&tet, face);
         }
         let vertices = tet.vertices().map(|v| unpacked(mesh.scratch(dense(v))));
         let across = tet.neighbor.map(|face| {
@@ -72,6 +85,7 @@ pub(super) fn to_bricks<P: Pages>(mesh: &mut Mesh<P>, partition: &KdPartition, b
         });
         let home = unpacked(mesh.scratch(n_vertices + k));
         let attribute = mesh.tet_attribute(sparse(k));
+        let is_due = !field.place.is_partial() || field.reaches(&mesh.ends(&tet));
         bricks.change(home.brick, |brick| {
             for (node, to) in tet.node.iter_mut().zip(vertices) {
                 *node = *node & !(VERTEX_MASK | MARK) | brick.refer(to);
@@ -82,12 +96,30 @@ pub(super) fn to_bricks<P: Pages>(mesh: &mut Mesh<P>, partition: &KdPartition, b
                 }
             }
             debug_assert_eq!(brick.tets.len(), home.slot as usize);
+            if !is_due {
+                tet.node[EXAMINED] |= MARK;
+            }
+            brick.unexamined += u32::from(is_due);
             brick.tets.push(tet);
             brick.attributes.push(attribute);
-            brick.unexamined += 1;
         });
     }
     mesh.clear_scratch();
+    // Pages that were changed together with their checksums: the caller then looks for the place.
+    assert_eq!(unmatched, 0, "neighbors of different faces");
+}
+
+/// A number that a face has on both of its sides if their vertices and references fit, and hardly ever otherwise; 0 on the boundary.
+fn pair_code(tet: &Tet, face: FaceRef) -> u64 {
+    let across = tet.neighbor[face.face()];
+    if !across.exists() {
+        return 0;
+    }
+    let word = |f: FaceRef| u64::from(f.tet()) << 2 | f.face() as u64;
+    let (here, there) = (word(face), word(across));
+    let vertices = tet.face(face.face()).map(|v| mix(u64::from(v)));
+    let of_vertices = vertices[0].wrapping_add(vertices[1]).wrapping_add(vertices[2]);
+    mix(of_vertices ^ mix(here.min(there) ^ mix(here.max(there))))
 }
 
 /// Where the vertices and tetrahedra of a brick are in pages.

@@ -3,17 +3,21 @@
 use rayon::prelude::*;
 
 use crate::mesh::anatomy::EDGES;
+use crate::mesh::{Mesh, dense, sparse};
 use crate::refine::Field;
 use crate::sizing::TETS_PER_LOAD;
-use tetdb_base::geom::{Point, orient};
-use tetdb_base::storage::{parallel, spare_threads};
+use tetdb_base::geom::{Point, mix, orient};
+use tetdb_base::storage::{Pages, parallel, spare_threads};
 
 /// A coarse tetrahedron worth more is halved.
 const WEIGHT_MAX: f64 = 8.0;
 /// Halvings at most.
 const DEPTH_MAX: u32 = 18;
-/// Tetrahedra sampled as one part.
+/// Tetrahedra sampled as one part, and parts sampled at once.
 const PART: usize = 4096;
+const PARTS: usize = 16;
+/// Samples kept. Where there are more, every second one goes, and the others count twice.
+const SAMPLES_MAX: usize = 1 << 19;
 
 /// Some predicted tetrahedra and their place.
 #[derive(Clone, Copy, Debug)]
@@ -22,21 +26,67 @@ pub(super) struct Sample {
     pub weight: f32,
 }
 
-/// Samples the load of coarse tetrahedra, given by their corners and the mean of the wanted lengths there.
-pub(super) fn sample(tets: &[([Point; 4], f64)], field: &Field) -> Vec<Sample> {
-    let part = |tets: &[([Point; 4], f64)]| {
-        let mut samples = Vec::new();
-        let mut open = Vec::new();
-        for &(corners, mean) in tets {
-            add(corners, mean, field, &mut open, &mut samples);
+impl Sample {
+    /// A number that has nothing to do with the place.
+    fn lot(&self) -> u64 {
+        self.at.to_array().into_iter().fold(0, |lot, x| mix(lot ^ x.to_bits()))
+    }
+}
+
+/// Samples the load to come of a coarse mesh. Their number is bounded.
+pub(super) fn sample<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<Sample> {
+    let mut samples = Samples::default();
+    let mut tets = Vec::with_capacity(PART * PARTS);
+    for t in (0..dense(mesh.tet_ids_end())).map(sparse) {
+        let tet = mesh.tet(t);
+        if tet.is_live() {
+            let ends = mesh.ends(&tet);
+            let mean = ends.iter().map(|e| f64::from(e.h)).sum::<f64>() * 0.25;
+            tets.push((ends.map(|e| e.point), mean));
         }
-        samples
-    };
-    let parts: Vec<Vec<Sample>> = match spare_threads() {
-        1 => tets.chunks(PART).map(part).collect(),
-        _ => parallel(|| tets.par_chunks(PART).map(part).collect()),
-    };
-    parts.concat()
+        if tets.len() == PART * PARTS {
+            samples.add(&tets, field);
+            tets.clear();
+        }
+    }
+    samples.add(&tets, field);
+    samples.kept
+}
+
+#[derive(Default)]
+struct Samples {
+    kept: Vec<Sample>,
+    /// How often half of the samples went.
+    halvings: u32,
+}
+
+impl Samples {
+    fn add(&mut self, tets: &[([Point; 4], f64)], field: &Field) {
+        let part = |tets: &[([Point; 4], f64)]| {
+            let mut samples = Vec::new();
+            let mut open = Vec::new();
+            for &(corners, mean) in tets {
+                add(corners, mean, field, &mut open, &mut samples);
+            }
+            samples
+        };
+        let parts: Vec<Vec<Sample>> = match spare_threads() {
+            1 => tets.chunks(PART).map(part).collect(),
+            _ => parallel(|| tets.par_chunks(PART).map(part).collect()),
+        };
+        for mut sample in parts.into_iter().flatten() {
+            if sample.lot() & ((1 << self.halvings) - 1) == 0 {
+                sample.weight *= (1u64 << self.halvings) as f32;
+                self.kept.push(sample);
+            }
+            if self.kept.len() >= SAMPLES_MAX {
+                let bit = 1 << self.halvings;
+                self.kept.retain(|s| s.lot() & bit == 0);
+                self.kept.iter_mut().for_each(|s| s.weight *= 2.0);
+                self.halvings += 1;
+            }
+        }
+    }
 }
 
 fn add(

@@ -27,7 +27,7 @@ mod tasks;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use crate::mesh::{Mesh, dense, sparse};
+use crate::mesh::Mesh;
 use crate::optimize::{Mode, OperationCounts};
 use crate::refine::{Field, RefineReport};
 use brick::Bricks;
@@ -66,12 +66,12 @@ pub fn saturate<P: Pages>(
     progress: &mut dyn FnMut(u64),
 ) -> BlockReport {
     let scaffold = scaffold::build(mesh, field);
-    let partition = KdPartition::new(samples(mesh, field), field.bounds, field.h);
+    let partition = KdPartition::new(load::sample(mesh, field), field.bounds, field.h);
     let n_bricks = partition.n_bricks();
     let memory = Memory::of(mesh, &partition);
     let bricks = Bricks::new(n_bricks, memory.bricks / 2, Some(dir.clone()));
     mesh.pages_mut().use_at_most(memory.pages_at_first);
-    convert::to_bricks(mesh, &partition, &bricks);
+    convert::to_bricks(mesh, field, &partition, &bricks);
     mesh.clear_tets();
     bricks.limit(memory.bricks);
     mesh.pages_mut().use_at_most(memory.pages);
@@ -105,20 +105,6 @@ pub fn saturate<P: Pages>(
         report.refine.over_constrained = over_constrained;
     }
     report
-}
-
-/// Where the load of the mesh is.
-fn samples<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<load::Sample> {
-    let mut tets = Vec::new();
-    for t in (0..dense(mesh.tet_ids_end())).map(sparse) {
-        let tet = mesh.tet(t);
-        if tet.is_live() {
-            let ends = mesh.ends(&tet);
-            let mean = ends.iter().map(|e| f64::from(e.h)).sum::<f64>() * 0.25;
-            tets.push((ends.map(|e| e.point), mean));
-        }
-    }
-    load::sample(&tets, field)
 }
 
 /// All that visits share.

@@ -59,7 +59,7 @@ pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
             let Ok(place) = place else {
                 continue;
             };
-            let least = FILTER * COARSER * h;
+            let least = FILTER * COARSER * field.place.coarse_length(point, h);
             let is_near = |mesh: &mut Mesh<P>, v: u32| {
                 (mesh.point(v) - point).length_squared() < least * least
             };
@@ -100,15 +100,15 @@ fn wanted<P: Pages>(mesh: &mut Mesh<P>, t: u32, field: &Field) -> Option<(Point,
     let least = ends.iter().map(|e| f64::from(e.h)).fold(f64::INFINITY, f64::min);
     let is_long = |h: f64| longest > (LONG * COARSER * h) * (LONG * COARSER * h);
     let middle = (p[0] + p[1] + p[2] + p[3]) * 0.25;
-    if !is_long(least) && !is_long((field.h)(middle)) || !field.reaches(&ends) {
+    if !is_long(least) && !is_long((field.h)(middle)) {
         return None;
     }
     let sphere = p[0] + center(p)?;
     let is_inside = FACES.iter().all(|&[a, b, c]| orient(sphere, p[a], p[b], p[c]) >= 0.0);
     let point = if is_inside { sphere } else { middle };
     let h = (field.h)(point);
-    let filter = FILTER * COARSER * h;
+    let length = field.place.coarse_length(point, h);
+    let filter = FILTER * COARSER * length;
     let is_far = p.iter().all(|&q| (q - point).length_squared() >= filter * filter);
-    let is_admitted = field.place.admits(point, h) && !field.place.forbids(point, h);
-    (is_long(h) && is_far && is_admitted).then_some((point, h))
+    (is_long(length) && is_far && !field.place.forbids(point, h)).then_some((point, h))
 }

@@ -19,6 +19,11 @@ pub trait PlacementRule: Sync {
     /// It may be too long, never too short. `sizes` are the wanted lengths at the ends, rounded to `f32`, or infinite where they are not known.
     fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]>;
 
+    /// The length for which coarse points around the part are spread, where the wanted length is `h`: it grows away from the part.
+    fn coarse_length(&self, _p: Point, h: f64) -> f64 {
+        h
+    }
+
     /// Whether a point with that wanted length is to be tried. Asked first: what it refuses costs nothing and is not counted.
     fn admits(&self, p: Point, h: f64) -> bool;
 

@@ -15,7 +15,7 @@ use tetdb_base::storage::parallel;
 /// Distance of new vertices from the surface. No vertex is inserted nearer than 0.25 h to a triangle or 0.71 h to a
 /// vertex, but vertices a little farther away leave that layer thinner. With 0.1 and 0.3 h from triangles thin plates
 /// of large triangles have a sixth more and a third fewer tetrahedra. With 0.5 and 0.6 h from vertices half of 42
-/// surfaces are off by more than 3.4 and 4.5 %, and with 0.55 a thin knot of 1,700 tetrahedra by 16 %.
+/// surfaces are off by more than 3.4 and 4.5 %.
 const SKIN: SurfaceSkin = SurfaceSkin { triangles: 0.2, vertices: 0.57 };
 /// Vertices per unit of load in the inside: 1.68 to 1.74 on balls, a box and three scans.
 const VERTICES_PER_LOAD: f64 = 1.69;
