@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Do the solvers' own readers see the mesh that the store has?
 
-  solvers.py INFO.json NAME.vtkhdf | NAME.vtu | NAME.msh | NAME.inp | NAME.mfem | CASE.foam | NAME.ele ...
+  solvers.py INFO.json NAME.vtkhdf | NAME.vtu | NAME.msh | NAME.inp | NAME.su2 | NAME.mfem | CASE.foam | NAME.ele ...
 
 INFO.json: what `tetdb info --json` printed. A `.vtkhdf` is read by VTK and by h5py, an OpenFOAM case (whole and processors) by a reader of
 this file, and by checkMesh where it is installed, `.msh` by gmsh, `.mfem` by PyMFEM (and its parts NAME.000000 .. by MFEM itself where
@@ -181,6 +181,23 @@ def check_inp(path, want):
     found = float(volumes(mesh.points, corners_of(mesh.points, tets)).sum())
     same(path, "volume", found, sum(want["volume by region"].values()))
     print(f"{path}: meshio {meshio.__version__} sees {len(tets)} tetrahedra of {tets.shape[1]} nodes")
+
+
+def check_su2(path, want):
+    """Elements and points as meshio reads them, markers by their names: they cover the boundary of all tetrahedra once, turned outward."""
+    import meshio
+    mesh = meshio.read(path)
+    tets = np.concatenate([block.data for block in mesh.cells if block.type == "tetra"])
+    tris = np.concatenate([block.data for block in mesh.cells if block.type == "triangle"])
+    same(path, "volume", float(volumes(mesh.points, tets).sum()), sum(want["volume by region"].values()))
+    faces = np.concatenate([tets[:, f] for f in ([1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1])])
+    _, place, n = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    turned = lambda t: sorted(tuple(np.roll(f, -int(np.argmin(f))).tolist()) for f in t)
+    same(path, "the boundary, turned outward", turned(tris) == turned(faces[place[n == 1]]), True)
+    text = open(path).read()
+    names = re.findall(r"MARKER_TAG= (\S+)\nMARKER_ELEMS= (\d+)\n", text)
+    same(path, "markers", [len(set(name for name, _ in names)), sum(int(k) for _, k in names)], [len(names), len(tris)])
+    print(f"{path}: meshio {meshio.__version__} sees {len(tets)} tetrahedra, {len(tris)} triangles in {len(names)} markers")
 
 
 def gmsh_file(gmsh, path):

@@ -14,9 +14,13 @@ fn two_parts() -> Place {
 #[test]
 fn the_standard_output_gets_the_bytes_of_the_file() {
     let place = two_parts();
-    for (name, word) in
-        [("a.mesh", "mesh"), ("a.json", "json"), ("a.inp", "inp"), ("a.mfem", "mfem")]
-    {
+    for (name, word) in [
+        ("a.mesh", "mesh"),
+        ("a.json", "json"),
+        ("a.inp", "inp"),
+        ("a.mfem", "mfem"),
+        ("a.su2", "su2"),
+    ] {
         place.run_line(&format!("export two.tetdb {name}")).succeeds();
         let before = place.names();
         let line = format!("export two.tetdb - --format {word}");

@@ -228,6 +228,7 @@ fn pieces_are_the_same_whoever_writes_them() {
         "part.mesh",
         "part.vtu --order 2",
         "part.inp",
+        "part.su2",
         "part.msh --ghosts --order 2",
         "part.mfem",
         "part.foam",

@@ -95,7 +95,7 @@ pub struct ExportArgs {
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .mfem (MFEM), .ele (TetGen),
-    /// .inp, .npy (one file per array), .json (topology), .csv and .jsonl (the rows of `tetdb query`), .parquet (where built in); `-` with --format is standard output
+    /// .inp, .su2, .npy (one file per array), .json (topology), .csv and .jsonl (the rows of `tetdb query`), .parquet (where built in); `-` with --format is standard output
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
     /// The format, where the name does not tell it: vtu, msh and so on, or msh22 for Gmsh's old format

@@ -134,7 +134,7 @@ impl ExportOptions {
 impl Store {
     /// Writes the mesh for another program. The ending of `out` selects the format.
     ///
-    /// Endings: `.vtu`, `.pvtu`, `.vtkhdf`, `.foam` (OpenFOAM), `.msh`, `.mesh`, `.meshb`, `.mfem`, `.ele` (TetGen), `.inp`, `.npy`,
+    /// Endings: `.vtu`, `.pvtu`, `.vtkhdf`, `.foam` (OpenFOAM), `.msh`, `.mesh`, `.meshb`, `.mfem`, `.ele` (TetGen), `.inp`, `.su2`, `.npy`,
     /// `.json` (neighbors of sub-domains), and `.parquet` with that feature. The mesh is streamed. A file gets its name only when it is
     /// complete.
     ///

@@ -11,7 +11,7 @@ use super::output_files::OutputFiles;
 use super::report::FileCounts;
 use super::selection::{Content, ElementOrder, ExportSelection};
 use super::writers::{Writers, is_first};
-use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtk};
+use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, su2, tetgen, vtk};
 
 /// Writes a mesh as one file with its side files. Several `writers` may share the tetrahedra of `.vtkhdf`; the first writes the rest.
 pub(super) fn write(
@@ -53,6 +53,7 @@ pub(super) fn write(
         MeshFormat::Gmsh => counts = gmsh::write(mesh, outputs, out, (selection, midpoints))?,
         MeshFormat::Gmsh22 => gmsh22::write(mesh, outputs, out)?,
         MeshFormat::Abaqus => abaqus::write(mesh, outputs, out, midpoints)?,
+        MeshFormat::Su2 => counts.triangles = su2::write(mesh, outputs, out)?,
         MeshFormat::Numpy => npy_columns::write(mesh, outputs, out)?,
         #[cfg(feature = "parquet")]
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),

@@ -26,6 +26,8 @@ pub enum MeshFormat {
     TetGen,
     /// Abaqus input.
     Abaqus,
+    /// SU2, without regions.
+    Su2,
     /// NumPy arrays, a file each: `NAME_points.npy`, `NAME_tets.npy` and others.
     Numpy,
     /// VTK XML, each sub-domain a piece in a file of its own.
@@ -70,6 +72,7 @@ const FORMATS: &[(&str, MeshFormat, u16)] = {
         ("mfem", Mfem, TEXT.0 | SUBDOMAINS.0 | REGIONS.0 | STREAM.0 | SLITS.0),
         ("ele", TetGen, TEXT.0 | PARTS | SLITS.0),
         ("inp", Abaqus, TEXT.0 | ORDER_2 | PARTS | STREAM.0 | SLITS.0),
+        ("su2", Su2, TEXT.0 | PARTS | STREAM.0),
         ("npy", Numpy, PARTS | SLITS.0),
         #[cfg(feature = "parquet")]
         ("parquet", Parquet, SUBDOMAINS.0),
@@ -118,7 +121,7 @@ impl MeshFormat {
 
 /// Endings of the formats.
 pub const ENDINGS: &str = if cfg!(feature = "parquet") {
-    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .npy, .parquet or .json"
+    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .su2, .npy, .parquet or .json"
 } else {
-    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .npy or .json (.parquet needs a build with the feature `parquet`)"
+    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .su2, .npy or .json (.parquet needs a build with the feature `parquet`)"
 };

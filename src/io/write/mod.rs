@@ -41,6 +41,7 @@ mod scope;
 mod selection;
 mod split;
 mod stream;
+mod su2;
 mod surface;
 #[cfg(test)]
 mod tests;

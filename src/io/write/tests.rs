@@ -430,7 +430,7 @@ fn files_do_not_depend_on_the_memory() -> Outcome {
     let path = dir.path().join("cubes.tetdb");
     cubes(&path, 20)?;
     let mut store = Catalog::open(&path)?;
-    let names = ["m.vtu", "m.meshb", "m.inp", "m.vtkhdf", "m.msh", "m.foam", "m.mfem"];
+    let names = ["m.vtu", "m.meshb", "m.inp", "m.vtkhdf", "m.msh", "m.foam", "m.mfem", "m.su2"];
     for (name, pieces) in names.iter().flat_map(|n| [(n, false), (n, true)]) {
         let selection = ExportSelection { pieces, ..ExportSelection::default() };
         let mut files = Vec::new();
@@ -590,7 +590,7 @@ fn progress_ends_at_its_total() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("two.tetdb");
     two_subdomains(&path)?;
-    for name in ["p.vtu", "p.msh", "p.foam", "p.ele", "p.mfem"] {
+    for name in ["p.vtu", "p.msh", "p.foam", "p.ele", "p.mfem", "p.su2"] {
         let progress = std::cell::RefCell::new(Vec::new());
         let report = |done, total| progress.borrow_mut().push((done, total));
         export(
