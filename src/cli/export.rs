@@ -130,13 +130,14 @@ fn options(args: &ExportArgs, settings: &Settings) -> Result<ExportOptions, Fail
         options = options.share(number, of);
     }
     type Flag = fn(ExportOptions) -> ExportOptions;
-    let flags: [(bool, Flag); 8] = [
+    let flags: [(bool, Flag); 9] = [
         (args.pieces, ExportOptions::pieces),
         (args.boundary, ExportOptions::boundary),
         (args.interfaces, ExportOptions::interfaces),
         (args.ascii, ExportOptions::ascii),
         (args.ghosts, ExportOptions::ghosts),
         (args.split_sheets, ExportOptions::split_sheets),
+        (args.one_partition, ExportOptions::one_partition),
         (args.order == 2, ExportOptions::second_order),
         (args.force, ExportOptions::over_inputs),
     ];
@@ -161,6 +162,7 @@ fn rows(args: &ExportArgs) -> Result<Option<QueryArgs>, Failure> {
         args.interfaces,
         args.ghosts,
         args.split_sheets,
+        args.one_partition,
         args.order != 1,
         args.read.json,
     ];

@@ -81,6 +81,12 @@ impl ExportOptions {
         self
     }
 
+    /// Writes all sub-domains as one partition, each vertex once; for `.vtkhdf`. Some programs, such as DOLFINx, read no other.
+    pub fn one_partition(mut self) -> Self {
+        self.selection.one_partition = true;
+        self
+    }
+
     /// Writes numbers as text instead of binary, if the format has both.
     pub fn ascii(mut self) -> Self {
         self.selection.ascii = true;

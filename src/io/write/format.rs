@@ -53,6 +53,7 @@ pub(super) const GHOSTS: Ability = Ability(64, "ghost cells");
 pub(super) const STREAM: Ability = Ability(128, "stream that is written from beginning to end");
 
 pub(super) const SLITS: Ability = Ability(256, "split sheets");
+pub(super) const PARTITIONS: Ability = Ability(512, "partitions that can be one");
 
 /// All formats: the word, which is also the ending of names except for `msh22`, and the abilities.
 const FORMATS: &[(&str, MeshFormat, u16)] = {
@@ -62,7 +63,7 @@ const FORMATS: &[(&str, MeshFormat, u16)] = {
     &[
         ("vtu", Vtu, ORDER_2 | FACES_ALONE.0 | PARTS | SLITS.0),
         ("pvtu", Pvtu, ORDER_2 | PARTS),
-        ("vtkhdf", VtkHdf, ORDER_2 | FACES_ALONE.0 | PARTS),
+        ("vtkhdf", VtkHdf, ORDER_2 | FACES_ALONE.0 | PARTS | PARTITIONS.0),
         // A process of MPI for each sub-domain, also where it has nothing of a region.
         ("foam", OpenFoam, TEXT.0 | SUBDOMAINS.0 | REGIONS.0),
         ("msh", Gmsh, TEXT.0 | ORDER_2 | PARTS | GHOSTS.0 | STREAM.0),

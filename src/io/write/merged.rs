@@ -93,6 +93,8 @@ pub(super) struct Merged<'a> {
     parts: Vec<Source>,
     regions: BTreeSet<u32>,
     numbering: Numbering,
+    /// Whether the vertices of each sub-domain have numbers of their own.
+    pub(super) is_apart: bool,
     faces: MergedFaces,
     doubles: Option<Doubles>,
     embedded: WrittenEmbedded,
@@ -142,6 +144,7 @@ impl<'a> Merged<'a> {
             parts,
             regions: scope.regions.clone(),
             numbering,
+            is_apart: scope.apart,
             faces,
             doubles: None,
             embedded: WrittenEmbedded::default(),

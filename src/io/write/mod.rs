@@ -57,7 +57,8 @@ use error::Result;
 pub use error::WriteError;
 pub use format::{ENDINGS, MeshFormat};
 use format::{
-    FACES_ALONE, GHOSTS, REGIONS, REGIONS_APART, SECOND_ORDER, SLITS, STREAM, SUBDOMAINS, TEXT,
+    FACES_ALONE, GHOSTS, PARTITIONS, REGIONS, REGIONS_APART, SECOND_ORDER, SLITS, STREAM,
+    SUBDOMAINS, TEXT,
 };
 pub use npy::TextFile;
 pub use npy::bytes;
@@ -122,7 +123,7 @@ pub fn export_with(
                 pieces::write(store, &mut outputs, out, what, memory_bytes, report)?
             }
             _ => {
-                let apart = format == MeshFormat::VtkHdf;
+                let apart = selection.is_apart(format);
                 let scope = Scope {
                     ranks: match selection.pieces {
                         true => &BTreeSet::new(),
@@ -131,7 +132,9 @@ pub fn export_with(
                     regions: &selection.regions,
                     faces: match selection.content {
                         _ if !is_first(writers) => FaceSet::Nothing,
-                        Content::Mesh if apart || format == MeshFormat::Gmsh => {
+                        Content::Mesh
+                            if matches!(format, MeshFormat::VtkHdf | MeshFormat::Gmsh) =>
+                        {
                             FaceSet::SkinAndInterfaces
                         }
                         Content::Mesh => FaceSet::Skin,
@@ -186,6 +189,7 @@ pub fn check(out: &Path, selection: &ExportSelection) -> Result<MeshFormat> {
         (regions, REGIONS),
         (regions && (pieces || subdomains), REGIONS_APART),
         (selection.split_sheets, SLITS),
+        (selection.one_partition, PARTITIONS),
         (stdout, STREAM),
     ];
     let refused = asked.into_iter().filter(|(is_asked, _)| *is_asked);

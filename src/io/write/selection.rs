@@ -25,6 +25,8 @@ pub struct ExportSelection {
     pub ghosts: bool,
     /// Write the vertices of sheets once for each side, and their triangles as boundary of both.
     pub split_sheets: bool,
+    /// All sub-domains in one partition, whose vertices are written once (`.vtkhdf`).
+    pub one_partition: bool,
     /// Nodes of the elements.
     pub order: ElementOrder,
 }
@@ -57,7 +59,16 @@ impl ExportSelection {
     /// Returns whether several processes can write the file together: the tetrahedra of `.vtkhdf`, a partition for each sub-domain.
     pub fn is_shared_file(&self, format: MeshFormat) -> bool {
         let is_plain = self.content == Content::Mesh && self.order == ElementOrder::First;
-        format == MeshFormat::VtkHdf && is_plain && !self.pieces && !self.split_sheets
+        format == MeshFormat::VtkHdf
+            && is_plain
+            && !self.pieces
+            && !self.split_sheets
+            && !self.one_partition
+    }
+
+    /// Returns whether the vertices of each sub-domain are written apart.
+    pub(super) fn is_apart(&self, format: MeshFormat) -> bool {
+        format == MeshFormat::VtkHdf && !self.one_partition
     }
 
     /// Returns whether this process writes the file that names all pieces.

@@ -274,6 +274,7 @@ impl Store {
                     "ascii" => options.ascii(),
                     "ghosts" => options.ghosts(),
                     "split_sheets" => options.split_sheets(),
+                    "one_partition" => options.one_partition(),
                     _ => options,
                 };
             }

@@ -38,13 +38,9 @@ impl Partition {
     }
 }
 
-/// One partition, or for `.vtkhdf` one for each sub-domain.
-pub(super) fn partitions(
-    mesh: &Merged,
-    is_hdf: bool,
-    midpoints: Option<&Midpoints>,
-) -> Vec<Partition> {
-    if !is_hdf {
+/// One partition, or one for each sub-domain where their vertices are apart.
+pub(super) fn partitions(mesh: &Merged, midpoints: Option<&Midpoints>) -> Vec<Partition> {
+    if !mesh.is_apart {
         return vec![Partition {
             rank: None,
             first_vertex: 0,
@@ -113,7 +109,7 @@ pub(in crate::write) fn write(
     let grid = VtkGrid::new(&container, counts, texts, points, faces);
     let path = outputs.create(out, grid.file_bytes())?;
     let mut file = grid.open(&path)?;
-    write_points(mesh, &mut file, &used, &partitions(mesh, is_hdf, midpoints), midpoints)?;
+    write_points(mesh, &mut file, &used, &partitions(mesh, midpoints), midpoints)?;
     file.begin_partition()?;
     mesh.faces().each(|face| file.cell(face, nodes.by_ref().take(n_corners as usize)))?;
     file.finish()?;

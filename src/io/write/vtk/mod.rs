@@ -1,6 +1,6 @@
 //! VTK unstructured grids, XML or HDF5: the tetrahedra in one file, the boundary faces in another beside it.
 //!
-//! A `.vtkhdf` file has a partition for each sub-domain, with vertices of its own. Reading order: `grid` (any VTK file), this file (the
+//! A `.vtkhdf` file has a partition for each sub-domain, with vertices of its own, or one partition. Reading order: `grid` (any VTK file), this file (the
 //! tetrahedra), `boundary`; then `selected` (some tetrahedra) and `defects` (triangles of a surface).
 
 mod boundary;
@@ -53,7 +53,7 @@ pub(super) fn write(
     writers: Option<&dyn Writers>,
 ) -> Result<()> {
     mesh.expect_passes(2, 1);
-    let partitions = partitions(mesh, is_hdf, midpoints);
+    let partitions = partitions(mesh, midpoints);
     let container = match is_hdf {
         true => Container::Hdf(partitions.iter().map(|p| [p.n_points(), p.n_tets]).collect()),
         false => Container::Xml,

@@ -544,6 +544,7 @@ class Store:
         ascii: bool = False,
         ghosts: bool = False,
         split_sheets: bool = False,
+        one_partition: bool = False,
     ) -> list[str]:
         """Writes the mesh for another program, in the format that the ending says, as ``tetdb export`` does.
 
@@ -567,6 +568,8 @@ class Store:
             With each partition the tetrahedra of others that touch it (``.msh``).
         split_sheets : bool
             Sheets as slits, with vertices of their own on both sides.
+        one_partition : bool
+            All sub-domains as one partition, each vertex once (``.vtkhdf``).
 
         Returns
         -------
@@ -576,7 +579,7 @@ class Store:
         if isinstance(order, bool) or order not in (1, 2):
             raise _options.usage(f"{order!r}: expected 1 or 2", "order")
         _options.one_of(content, ("mesh", "boundary", "interfaces"), "content")
-        flags = {"pieces": pieces, "ascii": ascii, "ghosts": ghosts, "split_sheets": split_sheets}
+        flags = {"pieces": pieces, "ascii": ascii, "ghosts": ghosts, "split_sheets": split_sheets, "one_partition": one_partition}
         words = {
             "subdomains": [] if subdomains is None else _options.ranks(subdomains, "subdomains"),
             "regions": [] if regions is None else _options.ranks(regions, "regions"),
