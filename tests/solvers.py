@@ -159,7 +159,7 @@ def check_vtkhdf(path, want):
         assert len(f["Offsets"]) == f["NumberOfCells"][:].sum() + len(f["NumberOfCells"])
         place = g["PointData/mesh_vertex"][:]
         assert (f["Points"][:][place] == g["Points"][:]).all()
-    print(f"{path}: VTK {vtk.vtkVersion().GetVTKVersion()} and HDF5 {h5py.version.hdf5_version} see {len(parts)} partitions, {sum(parts.values())} tetrahedra")
+    print(f"{path}: VTK {vtk.vtkVersion().GetVTKVersion()} and HDF5 {h5py.version.hdf5_version} see {len(parts)} sub-domains, {sum(parts.values())} tetrahedra")
 
 
 def check_vtu(path, want):

@@ -116,7 +116,7 @@ pub struct ExportArgs {
     /// List in .msh, for each partition, the tetrahedra of others that touch it
     #[arg(long)]
     pub ghosts: bool,
-    /// All sub-domains as one partition, each vertex once (.vtkhdf); some programs, such as DOLFINx, read no other
+    /// All sub-domains as one partition, each vertex once (.vtkhdf); some programs ask for it, DOLFINx among them
     #[arg(long)]
     pub one_partition: bool,
     /// Split embedded sheets: their vertices are written once for each side, those on free edges once; NAME_pairs.csv lists the pairs

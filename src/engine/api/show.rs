@@ -81,7 +81,7 @@ impl ExportOptions {
         self
     }
 
-    /// Writes all sub-domains as one partition, each vertex once; for `.vtkhdf`. Some programs, such as DOLFINx, read no other.
+    /// Writes all sub-domains as one partition, each vertex once; for `.vtkhdf`. Some programs ask for it, DOLFINx among them.
     pub fn one_partition(mut self) -> Self {
         self.selection.one_partition = true;
         self
