@@ -7,7 +7,8 @@ use tetdb_kernel::boundary::{BoundaryError, recover_with_progress};
 use tetdb_kernel::delaunay::{Kernel, enclose, insertion_key};
 use tetdb_kernel::mesh::{Mesh, MeshFacet, SHEET, VertexTag};
 
-use super::Watcher;
+/// Gets a stage, and how much of it is done of how much.
+pub type Watcher<'a> = dyn Fn(&'static str, u64, u64) + 'a;
 
 /// Vertices inserted between two looks at whether the run is cancelled.
 const AT_ONCE: usize = 1 << 12;

@@ -1,7 +1,8 @@
 //! Open and doubled surfaces closed where winding numbers say what is inside.
 //!
 //! ```text
-//!      triangles that touch in common vertices and edges alone   `resolve`, where they do not
+//!      shells seen from outside                                  `shells`
+//!   -> triangles that touch in common vertices and edges alone   `resolve`, where they do not
 //!   -> tetrahedra between them                                   `coarse`
 //!   -> winding numbers of the tetrahedra                         `winding`
 //!   -> inside and outside                                        `sides`: a minimum cut
@@ -13,6 +14,7 @@
 
 mod coarse;
 mod patches;
+mod shells;
 mod sides;
 mod winding;
 
@@ -27,14 +29,13 @@ use tetdb_base::surface::{Defect, Surface, closedness, repair_bytes, validate_wi
 use tetdb_kernel::boundary::BoundaryError;
 
 use crate::resolve::{ResolveError, Resolved, resolve};
+pub use coarse::Watcher;
 use coarse::coarse;
 pub use patches::{ClosedHole, LABELS_MAX};
 use patches::{Kept, keep};
+use shells::turn_shells;
 use sides::choose_sides;
 use winding::WindingTree;
-
-/// Gets a stage, and how much of it is done of how much.
-pub type Watcher<'a> = dyn Fn(&'static str, u64, u64) + 'a;
 
 /// Places listed at most.
 const LISTED_MAX: usize = 16;
@@ -117,6 +118,7 @@ pub fn close(
     watch: &Watcher,
 ) -> Result<Closed, CloseError> {
     watch("resolve crossings", 0, 0);
+    let shells_turned = turn_shells(surface);
     let resolved = resolve(surface, scratch)?;
     if surface.n_triangles() == 0 {
         return Err(CloseError::NothingInside);
@@ -146,7 +148,7 @@ pub fn close(
         triangles_added: holes.iter().map(|hole| hole.triangles).sum(),
         holes,
         points_added,
-        turned,
+        turned: turned + shells_turned,
         dropped_inside,
         dropped_outside,
         dropped_repeated,

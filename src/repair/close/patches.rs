@@ -135,7 +135,7 @@ fn add_closing(
     }
     kept.points_added = added.len();
     let first = surface.label_names.len() as u32;
-    let mut patches = patches(&triangles);
+    let mut patches = connected(&triangles);
     let corners = |surface: &Surface, t: usize| triangles[t].map(|v| surface.points[v as usize]);
     let area = |t: &usize| 0.5 * area_normal(corners(surface, *t)).length();
     let areas: Vec<f64> = patches.iter().map(|patch| patch.iter().map(area).sum()).collect();
@@ -175,7 +175,7 @@ fn edges(triangles: &[[u32; 3]], chosen: impl Iterator<Item = usize>) -> Vec<([u
 }
 
 /// Triangles that hang together through edges, in the order of their first triangles.
-fn patches(triangles: &[[u32; 3]]) -> Vec<Vec<usize>> {
+pub fn connected(triangles: &[[u32; 3]]) -> Vec<Vec<usize>> {
     fn root(on: &mut [usize], mut t: usize) -> usize {
         while on[t] != t {
             on[t] = on[on[t]];

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::Watcher;
+use super::coarse::Watcher;
 use super::winding::{WindingTree, area_normal};
 use tetdb_base::geom::{Aabb, Point, orient};
 use tetdb_base::storage::{FlatPages, check_cancelled, parallel};

@@ -260,6 +260,21 @@ fn turned_and_doubled_shells_are_solids() {
 }
 
 #[test]
+fn turned_shells_do_not_cancel_those_they_overlap() {
+    let [a, b] =
+        [block("a", Point::ZERO, Point::ONE), block("b", p(0.5, 0.25, 0.375), p(1.5, 1.25, 1.375))];
+    let union = 2.0 - 0.5 * 0.75 * 0.625;
+    for both in [[a.clone(), turned(b.clone())].concat(), [turned(a.clone()), b.clone()].concat()] {
+        let (_, done) = closed(&surface(&both));
+        assert!((done.volume - union).abs() < 1e-12 && done.turned >= 12, "{done:?}");
+    }
+    // All inside out, with a cavity.
+    let cavity: Vec<Named> = sphere(6).iter().map(|(_, t)| ("in", t.map(|p| p * 0.5))).collect();
+    let (_, done) = closed(&surface(&[turned(sphere(10)), cavity].concat()));
+    assert!(done.volume < 3.7, "{done:?}");
+}
+
+#[test]
 fn a_cavity_stays_empty() {
     let cavity: Vec<Named> = sphere(6).iter().map(|(_, t)| ("in", t.map(|p| p * 0.5))).collect();
     let before = surface(&[sphere(10), turned(cavity)].concat());

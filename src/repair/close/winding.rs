@@ -102,7 +102,11 @@ pub struct WindingTree<'a> {
 impl<'a> WindingTree<'a> {
     /// A tree over the triangles for which `is_taken` holds.
     pub fn new(surface: &'a Surface, is_taken: impl Fn(u32) -> bool) -> Self {
-        let order = (0..surface.n_triangles() as u32).filter(|&t| is_taken(t)).collect();
+        Self::of(surface, (0..surface.n_triangles() as u32).filter(|&t| is_taken(t)).collect())
+    }
+
+    /// A tree over these triangles.
+    pub fn of(surface: &'a Surface, order: Vec<u32>) -> Self {
         let mut tree = Self { surface, order, nodes: Vec::new() };
         if !tree.order.is_empty() {
             tree.build(0, tree.order.len());
