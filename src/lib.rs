@@ -5,17 +5,17 @@
 #[doc(inline)]
 pub use tetdb_engine::api::{
     AnswerColumn, AnswerFile, AnswerRow, AnswerValue, Answers, BOUNDARY_PREFIX, Bytes, CancelToken,
-    CellArrays, CheckReport, ChunkCounts, Code, ColorBy, Comparison, Condition, Defect,
-    DefectPlace, EmbedOutside, EmbeddedInfo, EmbeddedKind, Error, Event, Existing, ExportOptions,
-    Exported, ExprError, GatherReport, LabelSet, Length, MESH_ENDINGS, MeshFormat, MeshOptions,
-    Mesher, Optimize, OptionsText, Order, Population, Prediction, Qualities, Query, RegionInfo,
-    Regions, Remesh, RemeshForecast, Remeshed, RepairKind, RepairReport, Reported, ResolveReport,
-    SAMPLE_PREFIX, Seal, Seed, SeedKind, Settings, Share, ShownTriangles, SizeWarning, Sizes,
-    Snapped, Snapshot, SplitReport, StageInfo, Store, StoreInfo, SubdomainInfo, Subdomains,
-    Suggestion, Summary, Surface, SurfaceRemesh, SurfaceRemeshReport, SurfaceReport,
-    SurfaceWritten, TaskReport, TaskStage, TaskStatus, Tasks, TetId, VARIABLES, Verification,
-    VerifyLevel, VertexId, WELD_SHARE_MAX, Word, WorkersPrediction, Writers, check_target,
-    csv_head, inputs_of, peak_bytes, short, task_ranges, typed,
+    CellArrays, CheckReport, ChunkCounts, CloseReport, ClosedHole, Code, ColorBy, Comparison,
+    Condition, Defect, DefectPlace, EmbedOutside, EmbeddedInfo, EmbeddedKind, Error, Event,
+    Existing, ExportOptions, Exported, ExprError, GatherReport, LabelSet, Length, MESH_ENDINGS,
+    MeshFormat, MeshOptions, Mesher, Optimize, OptionsText, Order, Population, Prediction,
+    Qualities, Query, RegionInfo, Regions, Remesh, RemeshForecast, Remeshed, RepairKind,
+    RepairReport, RepairStep, Reported, ResolveReport, SAMPLE_PREFIX, Seal, Seed, SeedKind,
+    Settings, Share, ShownTriangles, SizeWarning, Sizes, Snapped, Snapshot, SplitReport, StageInfo,
+    Store, StoreInfo, SubdomainInfo, Subdomains, Suggestion, Summary, Surface, SurfaceRemesh,
+    SurfaceRemeshReport, SurfaceReport, SurfaceWritten, TaskReport, TaskStage, TaskStatus, Tasks,
+    TetId, VARIABLES, Verification, VerifyLevel, VertexId, WELD_SHARE_MAX, Word, WorkersPrediction,
+    Writers, check_target, csv_head, inputs_of, peak_bytes, short, task_ranges, typed,
 };
 
 #[cfg(feature = "mpi")]

@@ -28,6 +28,11 @@ pub enum Origin {
     SheetsFrom(usize),
     /// Crossing triangles were divided; what was done, in words. The fingerprint is that of the divided surface.
     Resolved(String),
+    /// Holes were closed by winding numbers; what was done, in words. The fingerprint is that of the closed surface.
+    Closed(String),
+    /// Near points were joined, and what needs no guess was repaired; what was done, in words that begin with the share of the box
+    /// diagonal. The fingerprint is that of the repaired surface.
+    Welded(String),
     /// All parts that are not closed are sheets.
     OpenParts,
     /// Embedded edges.
@@ -54,6 +59,8 @@ const COPY: &str = "store:surface.obj";
 const SHEET: &str = "sheet:";
 const SHEETS_FROM: &str = "sheets-from:";
 const RESOLVED: &str = "resolved:";
+const CLOSED: &str = "closed:";
+const WELDED: &str = "welded:";
 const OPEN_PARTS: &str = "open-parts:";
 const EDGES: &str = "edges:";
 const POINTS: &str = "points:";
@@ -79,6 +86,10 @@ impl Source {
             Origin::OpenParts
         } else if let Some(rest) = after(RESOLVED) {
             Origin::Resolved(rest.to_owned())
+        } else if let Some(rest) = after(CLOSED) {
+            Origin::Closed(rest.to_owned())
+        } else if let Some(rest) = after(WELDED) {
+            Origin::Welded(rest.to_owned())
         } else if let Some(rest) = after(SHEETS_FROM) {
             Origin::SheetsFrom(rest.parse().ok()?)
         } else if let Some(rest) = after(SHEET) {
@@ -107,6 +118,8 @@ impl Source {
             Origin::Sheet(file) => named(SHEET, file),
             Origin::SheetsFrom(first) => format!("{SHEETS_FROM}{first}"),
             Origin::Resolved(what) => format!("{RESOLVED}{what}"),
+            Origin::Closed(what) => format!("{CLOSED}{what}"),
+            Origin::Welded(what) => format!("{WELDED}{what}"),
             Origin::OpenParts => OPEN_PARTS.to_owned(),
             Origin::Edges(file) => named(EDGES, file),
             Origin::Points(file) => named(POINTS, file),
@@ -126,6 +139,11 @@ impl Origin {
             }
             _ => None,
         }
+    }
+
+    /// Returns whether it is a repair of the parts before it.
+    pub fn is_repair(&self) -> bool {
+        matches!(self, Self::Resolved(_) | Self::Closed(_) | Self::Welded(_))
     }
 
     /// Returns whether the part is inside the surface, and was added after its own triangles.
@@ -149,6 +167,8 @@ mod tests {
             "sheets-from:120",
             "open-parts:",
             "resolved:56 pairs",
+            "closed:holes=2,area=3e-1",
+            "welded:share=1e-6,joined=4",
             "edges:well=/home/a/wells.obj",
             "points:sensor=/home/a/p.csv",
             "wires:12,3",

@@ -14,7 +14,7 @@ use super::memory;
 use super::words;
 use tetdb_engine::api::targets::check_target;
 use tetdb_engine::api::{
-    Code, RepairKind, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short, typed,
+    Code, RepairReport, RepairStep, Surface, SurfaceReport, WELD_SHARE_MAX, short, typed,
 };
 
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
@@ -43,11 +43,11 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
         (surface, done) = surface.repair_reported(weld_share, &settings)?;
         repair = Some(done);
     }
-    let mut resolve = None;
-    if args.repair == Some(Some(RepairKind::Resolve)) {
+    let mut steps = None;
+    if let Some(Some(kind)) = args.repair {
         let done;
-        (surface, done) = surface.resolve_reported(&settings)?;
-        resolve = Some(done);
+        (surface, done) = surface.repaired_by(kind, &settings)?;
+        steps = Some(done);
     }
     let report = surface.report(&settings, console.is_verbose())?;
     let written = write_files(args, &surface, &report, console)?;
@@ -57,8 +57,13 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
         if let Some(repair) = &repair {
             answer["repair"] = json!(repair);
         }
-        if let Some(resolve) = &resolve {
-            answer["resolve"] = json!(resolve);
+        for step in steps.iter().flatten() {
+            match step {
+                RepairStep::Resolve(done) => answer["resolve"] = json!(done),
+                RepairStep::Winding(done) => answer["winding"] = json!(done),
+                RepairStep::Weld(done) => answer["repair"] = json!(done),
+                _ => {}
+            }
         }
         for (field, value) in written {
             answer[field] = value;
@@ -68,8 +73,8 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
         if let Some(repair) = &repair {
             print_repair(repair, console);
         }
-        if let Some(resolve) = &resolve {
-            input::note_resolved(resolve, console);
+        if let Some(steps) = &steps {
+            input::note_repaired(steps, console);
         }
         let surfaces: Vec<String> =
             args.surfaces.iter().map(|word| words::quoted(Path::new(word))).collect();

@@ -125,7 +125,7 @@ impl Printed<'_> {
         };
         let Some(closes) = self.report.closes() else {
             console.line(&format!(
-                "no repair closes it: {} edges stay open even when points nearer than {:e} of the box diagonal are joined",
+                "joining points does not close it: {} edges stay open even when points nearer than {:e} of the box diagonal are joined",
                 last.open_edges, last.share
             ));
             return;
@@ -199,6 +199,19 @@ impl Printed<'_> {
         if matches!(first, Defect::OpenEdge { .. }) && self.report.closes().is_some() {
             return;
         }
+        let is_dropped =
+            |d: &Defect| matches!(d, Defect::Degenerate { .. } | Defect::Duplicate { .. });
+        let all_dropped =
+            self.report.validation.defects.iter().all(is_dropped) && !self.is_repaired;
+        if let Some(done) = self.report.enclosing.as_ref().filter(|_| !all_dropped) {
+            console.line(&format!(
+                "help: `tetdb mesh {} --repair winding` closes it first: {}",
+                self.surfaces,
+                done.in_words()
+            ));
+            return;
+        }
+        // A wrap, for what cannot be closed, would be offered here.
         if let Some(done) = &self.report.resolving {
             let rest = match done.n_defects {
                 0 => String::new(),
@@ -212,8 +225,7 @@ impl Printed<'_> {
             ));
             return;
         }
-        let is_dropped = matches!(first, Defect::Degenerate { .. } | Defect::Duplicate { .. });
-        let help = if is_dropped && !self.is_repaired {
+        let help = if is_dropped(first) && !self.is_repaired {
             format!("`tetdb check {} --repair --write OUT` drops such triangles", self.surfaces)
         } else if matches!(first, Defect::OpenEdge { .. }) {
             // The list of holes already says that no repair closes them.

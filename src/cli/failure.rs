@@ -125,7 +125,7 @@ fn help_of(code: Code) -> &'static str {
             "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
         }
         Code::OpenSurface => {
-            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made. If the open part is meant as a sheet inside, give it with --embed, or use --allow-open"
+            "`tetdb check SURFACE` lists the holes and says which repair closes them; `--repair auto` takes the cheapest. If the open part is meant as a sheet inside, give it with --embed, or use --allow-open"
         }
         Code::SelfIntersection => {
             "`tetdb check SURFACE` lists the places, and says whether --repair resolve, which divides crossing triangles, leaves a surface that can be meshed"

@@ -7,7 +7,8 @@ use super::console::Console;
 use super::failure::Failure;
 use super::words::count;
 use tetdb_engine::api::{
-    Code, EmbeddedKind, MeshOptions, RepairKind, ResolveReport, Settings, Surface, SurfaceWritten,
+    Code, EmbeddedKind, MeshOptions, RepairKind, RepairStep, ResolveReport, Settings, Surface,
+    SurfaceWritten,
 };
 
 /// The same settings, with temporary files in the folder of `file` or its nearest existing parent.
@@ -30,8 +31,24 @@ pub fn note_lost(surface: &Surface, written: SurfaceWritten, console: &Console) 
     }
 }
 
+/// Says how a surface was repaired.
+pub fn note_repaired(steps: &[RepairStep], console: &Console) {
+    if steps.is_empty() {
+        console.note("note: the surface has no defects, and was not repaired");
+    }
+    for step in steps {
+        match step {
+            RepairStep::Resolve(done) => note_resolved(done, console),
+            RepairStep::Winding(done) => {
+                console.note(&format!("note: closed: {}", done.in_words()));
+            }
+            other => console.note(&format!("note: repaired: {}", other.in_words())),
+        }
+    }
+}
+
 /// Says what was done to crossings, and which regions there are now.
-pub fn note_resolved(done: &ResolveReport, console: &Console) {
+fn note_resolved(done: &ResolveReport, console: &Console) {
     console.note(&format!("note: resolved: {}", done.in_words()));
     if let [first, rest @ ..] = &done.regions[..] {
         let or = rest.iter().map(|rule| format!(" or --regions {rule}")).collect::<String>();
@@ -63,10 +80,10 @@ pub fn load_with(
         names.push((file, name));
     }
     let mut surface = Surface::load(arguments, settings)?;
-    if let Some(RepairKind::Resolve) = repair {
-        let done;
-        (surface, done) = surface.resolve_reported(settings)?;
-        note_resolved(&done, console);
+    if let Some(kind) = repair {
+        let steps;
+        (surface, steps) = surface.repaired_by(kind, settings)?;
+        note_repaired(&steps, console);
     }
     if sheets.allow_open {
         let (with, n) = surface.open_parts_with(settings)?;

@@ -2,7 +2,8 @@
 //!
 //! | chapter | what you learn |
 //! |---|---|
-//! | [`start`] | build the program, mesh a surface of your own, check the result, repair a surface |
+//! | [`start`] | build the program, mesh a surface of your own, check the result |
+//! | [`repair`] | mesh surfaces with cracks, holes and crossings |
 //! | [`sizes`] | say how long edges should be: everywhere, in places, by a formula or a file |
 //! | [`regions`] | choose which volumes are filled |
 //! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |
@@ -23,6 +24,7 @@ macro_rules! links {
             "[start]: crate::guide::start\n",
             "[sizes]: crate::guide::sizes\n",
             "[regions]: crate::guide::regions\n",
+            "[repair]: crate::guide::repair\n",
             "[subdomains]: crate::guide::subdomains\n",
             "[cluster]: crate::guide::cluster\n",
             "[questions]: crate::guide::questions\n",
@@ -53,6 +55,10 @@ pub mod start {
 pub mod sizes {
     #![doc = links!()]
     #![doc = include_str!("sizes.md")]
+}
+pub mod repair {
+    #![doc = links!()]
+    #![doc = include_str!("repair.md")]
 }
 pub mod regions {
     #![doc = links!()]

@@ -35,7 +35,7 @@ fn an_open_surface_tells_its_holes() {
     assert!(answer["closing"]["smallest"].is_null(), "{answer}");
     let text = place.run_line("check open.off").stdout();
     assert!(text.contains("4 open edges around 1 hole"), "{text}");
-    assert!(text.contains("no repair closes it"), "{text}");
+    assert!(text.contains("joining points does not close it"), "{text}");
     assert_eq!(place.names(), names);
 }
 
@@ -215,6 +215,7 @@ fn the_answer_has_its_fields() {
             "cures",
             "defects",
             "edges",
+            "enclosing",
             "fitness",
             "label_sets",
             "labels",

@@ -158,6 +158,7 @@ macro_rules! chapters {
 chapters! {
     start: 10,
     sizes: 8,
+    repair: 6,
     regions: 3,
     subdomains: 5,
     cluster: 8,

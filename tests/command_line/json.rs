@@ -26,6 +26,8 @@ const RUNS: [(&str, &[&str]); 17] = [
             "check needles.off",
             "check sample:broken,kind=crossings",
             "check sample:broken,kind=crossings --repair=resolve --write r.off",
+            "check sample:broken,kind=holes",
+            "check sample:broken,kind=holes --repair=winding --write w.off",
             "check holes.off --repair --weld 1e-3 --write fixed.off",
         ],
     ),

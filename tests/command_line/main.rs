@@ -2,6 +2,7 @@
 
 mod cells;
 mod check;
+mod closed;
 mod crash;
 mod damage;
 mod errors;

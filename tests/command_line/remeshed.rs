@@ -28,7 +28,7 @@ fn cylinder(n: usize) -> String {
 #[test]
 fn needles_become_even_triangles_and_good_tetrahedra() {
     let place = Place::new();
-    place.write("rod.obj", &cylinder(60));
+    place.write("rod.obj", cylinder(60));
     let made =
         place.run_line("remesh-surface rod.obj even.obj --tolerance 0.3% --json").succeeds().json();
     let report = &made["report"];

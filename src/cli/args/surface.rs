@@ -38,7 +38,9 @@ impl SheetArgs {
 /// A repair before anything else.
 #[derive(Debug, clap::Args)]
 pub struct RepairArgs {
-    /// Repair the surface first: resolve divides triangles that cross along their intersections; the others stay as they are
+    /// Repair the surface first: resolve divides triangles that cross along their intersections, and the others stay as they are; winding
+    /// then closes holes, turns shells outward and unites what overlaps; auto takes the first of joining near points, resolve and winding
+    /// that leaves no defect
     #[arg(long, value_name = "HOW", value_parser = word_of::<RepairKind>(&[]))]
     pub repair: Option<RepairKind>,
 }
@@ -62,7 +64,8 @@ pub struct CheckArgs {
     #[arg(long, value_name = "FILE")]
     pub write_bad: Option<PathBuf>,
     /// Drop triangles without area and repeated ones, divide triangles at T-junctions, turn triangles so that neighbors face the same side;
-    /// --repair=resolve instead divides triangles that cross along their intersections
+    /// --repair=resolve instead divides triangles that cross along their intersections, --repair=winding closes holes, --repair=auto takes
+    /// what is needed
     #[arg(long, requires = "write", value_name = "HOW", num_args = 0..=1, require_equals = true, value_parser = word_of::<RepairKind>(&[]))]
     pub repair: Option<Option<RepairKind>>,
     /// With --repair: first join points not farther apart than this share of the box diagonal

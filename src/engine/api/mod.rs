@@ -9,7 +9,7 @@
 //! | modules | subject |
 //! |---|---|
 //! | `surface`, `surface_arrays`, `surface_wires` | the input surface; embedded sheets, edges and points |
-//! | `surface_limits`, `surface_repair`, `surface_remesh`, `defects`, `surface_report`, `suggestions` | calls within a memory limit; repairs; reports |
+//! | `surface_limits`, `surface_repair`, `surface_resolve`, `surface_close`, `surface_auto`, `surface_remesh`, `defects`, `surface_report`, `suggestions` | calls within a memory limit; repairs; reports |
 //! | `sizes`, `field_arrays`, `options` | wanted edge lengths and other options of a mesh |
 //! | `settings`, `memory` | memory, threads, cancelling, progress |
 //! | `mesher`, `prediction`, `resume` | a new store; predictions; interrupted runs |
@@ -58,6 +58,8 @@ mod store;
 mod suggestions;
 mod surface;
 mod surface_arrays;
+mod surface_auto;
+mod surface_close;
 mod surface_limits;
 mod surface_remesh;
 mod surface_repair;
@@ -107,10 +109,12 @@ pub use store::{Store, Summary};
 pub use suggestions::Suggestion;
 pub use surface::{CheckReport, Surface};
 pub use surface_arrays::CellArrays;
+pub use surface_auto::{RepairKind, RepairStep};
+pub use surface_close::CloseReport;
 pub use surface_remesh::SurfaceRemesh;
 pub use surface_repair::{RepairReport, WELD_SHARE_MAX};
 pub use surface_report::SurfaceReport;
-pub use surface_resolve::{RepairKind, ResolveReport};
+pub use surface_resolve::ResolveReport;
 pub use targets::{check_target, inputs_of};
 pub use tasks::Tasks;
 pub use tasks_status::{GatherReport, TaskReport, TaskStage, TaskStatus, task_ranges};
@@ -125,6 +129,7 @@ pub use tetdb_io::read::{PointColumns, PointTable, read_seeds};
 pub use tetdb_io::write::SurfaceWritten;
 pub use tetdb_kernel::samples::PREFIX as SAMPLE_PREFIX;
 pub use tetdb_kernel::sizing::SizeWarning;
+pub use tetdb_repair::close::ClosedHole;
 pub use tetdb_repair::remesh::RemeshReport as SurfaceRemeshReport;
 pub use tetdb_schema::catalog::{QualityRow, StoreState};
 pub use tetdb_schema::code::Code;

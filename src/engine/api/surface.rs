@@ -452,7 +452,9 @@ impl Surface {
             Origin::Points(NamedFile { name, file }) => {
                 self.with_wires(Path::new(file), WireKind::Points, Some(name), scratch)
             }
-            Origin::Resolved(_) => Ok(self.resolved_in(scratch)?.0),
+            Origin::Resolved(_) | Origin::Closed(_) | Origin::Welded(_) => {
+                self.repaired_again(origin, scratch)
+            }
             Origin::OpenParts | Origin::File(_) | Origin::Sample(_) | Origin::Copy => {
                 Ok(self.open_parts_in(scratch)?.0)
             }
@@ -465,13 +467,13 @@ impl Surface {
         Self::of(inner, vec![source])
     }
 
-    /// The record of a copy in the store; that crossings were resolved stays on record.
+    /// The record of a copy in the store; how it was repaired stays on record.
     pub(super) fn copied(&self, inner: &surface::Surface) -> Vec<Source> {
         let own = given(inner);
         let of_copy = |s: &Source| Source { hash: own.hash, ..s.clone() };
-        let mut resolved = self.sources.iter().filter(|s| matches!(s.origin, Origin::Resolved(_)));
-        let resolved = resolved.next().map(of_copy);
-        std::iter::once(own).chain(resolved).collect()
+        let repairs: Vec<Source> =
+            self.sources.iter().filter(|s| s.origin.is_repair()).map(of_copy).collect();
+        std::iter::once(own).chain(repairs).collect()
     }
 
     fn of(inner: surface::Surface, sources: Vec<Source>) -> Self {

@@ -6,9 +6,9 @@ use tetdb_schema::code::Code;
 
 use super::error::{Error, Remedy};
 use super::surface::refuse_sheets;
-use super::{Bytes, Settings, Surface, guarded};
-use tetdb_base::storage::attempt;
-use tetdb_base::surface::{Repair, repair, repair_bytes, validate_with};
+use super::{Bytes, Event, Settings, Surface, guarded};
+use tetdb_base::storage::{ScratchSpace, attempt};
+use tetdb_base::surface::{self, Repair, repair, repair_bytes, validate_with};
 
 /// Largest share of the box diagonal within which points are joined. Beyond it a surface loses its shape.
 pub const WELD_SHARE_MAX: f64 = 0.01;
@@ -75,16 +75,7 @@ impl Surface {
         }
         refuse_sheets(&self.inner, "repaired")?;
         guarded(settings, || {
-            let least = repair_bytes(&self.inner);
-            if settings.cap()? < least {
-                let message = format!(
-                    "a surface of {} triangles is repaired in {} of memory",
-                    self.inner.n_triangles(),
-                    Bytes(least)
-                );
-                return Err(Error::new(Code::Memory, message).with_remedy(Remedy::Memory(least)));
-            }
-            let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
+            let scratch = within(settings, &self.inner, repair_bytes(&self.inner))?;
             let n_defects_before = attempt(|| validate_with(&self.inner, &scratch))?.n_defects;
             let (triangles_before, vertices_before) =
                 (self.inner.n_triangles(), self.inner.n_vertices());
@@ -105,4 +96,31 @@ impl Surface {
             Ok((self, report))
         })
     }
+}
+
+impl Settings {
+    /// A listener for the steps of a repair.
+    pub(super) fn repair_watcher(&self) -> impl Fn(&'static str, u64, u64) + '_ {
+        |stage, done, total| {
+            let total = (total > 0).then_some(total);
+            self.say(&Event::Progress { stage, done, total, unit: "steps" });
+        }
+    }
+}
+
+/// Scratch space for the repair of a surface that takes `least` bytes of memory.
+pub(super) fn within(
+    settings: &Settings,
+    surface: &surface::Surface,
+    least: u64,
+) -> Result<ScratchSpace, Error> {
+    if settings.cap()? < least {
+        let message = format!(
+            "a surface of {} triangles is repaired in {} of memory",
+            surface.n_triangles(),
+            Bytes(least)
+        );
+        return Err(Error::new(Code::Memory, message).with_remedy(Remedy::Memory(least)));
+    }
+    settings.scratch_space(surface.bytes() as u64)
 }

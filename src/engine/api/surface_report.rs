@@ -6,8 +6,9 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 
 use super::suggestions::{Suggestion, suggestions};
+use super::surface_close::tried as tried_closing;
 use super::surface_resolve::{ResolveReport, tried};
-use super::{Bytes, Error, Settings, Surface, guarded, predict};
+use super::{Bytes, CloseReport, Error, Settings, Surface, guarded, predict};
 use crate::pipeline::{MeshOptions, Prepared, least_for};
 use tetdb_base::geom::short;
 use tetdb_base::shape::face_least;
@@ -17,6 +18,7 @@ use tetdb_base::surface::{
     repair_bytes, triangle_name, validate_with,
 };
 use tetdb_io::write;
+use tetdb_repair::close::close_bytes;
 
 /// Above this number of triangles, tetrahedra are estimated only on request. Computing sizes and their integral takes two to three times
 /// as long as the rest of the report.
@@ -44,6 +46,8 @@ pub struct SurfaceReport<'a> {
     pub closing: Vec<Closing>,
     /// What resolving the crossings would do; `None` where there are none, where it fails, and for a large surface.
     pub resolving: Option<ResolveReport>,
+    /// What closing it by winding numbers would do, where resolving leaves defects; `None` where that fails, and for a large surface.
+    pub enclosing: Option<CloseReport>,
     /// Shapes of the triangles.
     pub fitness: Fitness,
     /// Estimated number of tetrahedra with default sizes. `None` if the surface cannot be meshed, or if it is large and no estimate was
@@ -91,12 +95,18 @@ impl<'a> SurfaceReport<'a> {
         let scratch = settings.scratch_space(surface.bytes() as u64)?;
         let validation = attempt(|| validate_with(surface, &scratch))?;
         let n_crossings = validation.n_intersections;
-        let is_tried = (1..=RESOLVED_MAX).contains(&n_crossings)
+        let is_tried = n_crossings <= RESOLVED_MAX
             && surface.n_triangles() <= ESTIMATED_MAX
-            && cap >= 2 * repair_bytes(surface)
             && !surface.has_sheets()
             && !surface.has_embedded();
-        let resolving = is_tried.then(|| tried(surface, &scratch)).flatten();
+        let resolving = (is_tried && n_crossings > 0 && cap >= 2 * repair_bytes(surface))
+            .then(|| tried(surface, &scratch))
+            .flatten();
+        let is_unsolved =
+            !validation.is_valid() && resolving.as_ref().is_none_or(|r| r.n_defects > 0);
+        let enclosing = (is_tried && is_unsolved && cap >= 2 * close_bytes(surface))
+            .then(|| tried_closing(surface, &scratch))
+            .flatten();
         drop(scratch);
         let fitness = fitness(surface, &validation.closedness);
         let is_estimated =
@@ -123,6 +133,7 @@ impl<'a> SurfaceReport<'a> {
             boundary_loops: boundary_loops(surface, &validation.closedness),
             closing,
             resolving,
+            enclosing,
             fitness,
             tets_expected: prepared.map(|prepared| prepared.estimate.tets()),
             suggestions,
@@ -259,7 +270,7 @@ impl<'a> SurfaceReport<'a> {
             "defects": found.defects.iter().map(|defect| defect_json(defect, surface)).collect::<Vec<_>>(),
             "open_loops": open_loops, "t_junctions": junctions,
             "closing": { "tried": self.closing, "smallest": self.closes().map(|c| c.share) },
-            "resolving": self.resolving, "fitness": fitness, "advice": self.advice(), "cures": self.suggestions,
+            "resolving": self.resolving, "enclosing": self.enclosing, "fitness": fitness, "advice": self.advice(), "cures": self.suggestions,
         })
     }
 }

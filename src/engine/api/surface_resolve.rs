@@ -2,11 +2,12 @@
 
 use serde::Serialize;
 use tetdb_schema::code::Code;
-use tetdb_schema::source::{Origin, Source};
+use tetdb_schema::source::Origin;
 
-use super::error::{Error, Remedy};
-use super::surface::{given, refuse_sheets};
-use super::{Bytes, Settings, Surface, guarded};
+use super::error::Error;
+use super::surface::refuse_sheets;
+use super::surface_repair::within;
+use super::{Settings, Surface, guarded};
 use tetdb_base::geom::{counted, short};
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface::{
@@ -14,19 +15,6 @@ use tetdb_base::surface::{
 };
 use tetdb_kernel::boundary::RegionPolicy;
 use tetdb_repair::resolve::{ResolveError, Resolved, resolve};
-use tetdb_schema::word::Word;
-
-/// Repairs that a mesh can begin with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum RepairKind {
-    /// Crossing triangles are divided where they cross; see [`Surface::resolved`].
-    Resolve,
-}
-
-impl Word for RepairKind {
-    const WORDS: &'static [(Self, &'static str)] = &[(Self::Resolve, "resolve")];
-}
 
 /// What was done to crossing triangles. Serialized, it is the key `resolve` of `tetdb check --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -53,7 +41,7 @@ pub struct ResolveReport {
 }
 
 impl ResolveReport {
-    fn new(done: &Resolved, n_defects: u64, regions: Vec<&'static str>) -> Self {
+    pub(super) fn new(done: &Resolved, n_defects: u64, regions: Vec<&'static str>) -> Self {
         Self {
             pairs: done.pairs,
             divided: done.divided,
@@ -104,16 +92,7 @@ impl Surface {
     pub fn resolve_reported(self, settings: &Settings) -> Result<(Self, ResolveReport), Error> {
         refuse_sheets(&self.inner, "repaired")?;
         guarded(settings, || {
-            let least = repair_bytes(&self.inner);
-            if settings.cap()? < least {
-                let message = format!(
-                    "a surface of {} triangles is repaired in {} of memory",
-                    self.inner.n_triangles(),
-                    Bytes(least)
-                );
-                return Err(Error::new(Code::Memory, message).with_remedy(Remedy::Memory(least)));
-            }
-            let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
+            let scratch = within(settings, &self.inner, repair_bytes(&self.inner))?;
             let (surface, done) = self.resolved_in(&scratch)?;
             let report = report(&surface.inner, &done, &scratch)?;
             Ok((surface, report))
@@ -122,18 +101,12 @@ impl Surface {
 
     /// Divides triangles that cross, and puts that on record.
     pub(super) fn resolved_in(mut self, scratch: &ScratchSpace) -> Result<(Self, Resolved), Error> {
-        let is_file = self.sources.iter().all(|s| s.origin != Origin::Copy);
         let done = attempt(|| resolve(&mut self.inner, scratch))??;
         let Resolved { pairs, divided, points_added, rounds, moved_most, .. } = done;
         let text = format!(
             "pairs={pairs},divided={divided},added={points_added},rounds={rounds},moved={moved_most:e}"
         );
-        let own = given(&self.inner);
-        self.sources.retain(|s| !matches!(s.origin, Origin::Resolved(_)));
-        if !is_file {
-            self.sources = vec![own.clone()];
-        }
-        self.sources.push(Source { origin: Origin::Resolved(text), ..own });
+        self.record(Origin::Resolved(text));
         Ok((self, done))
     }
 }
@@ -145,7 +118,7 @@ pub(super) fn tried(surface: &surface::Surface, scratch: &ScratchSpace) -> Optio
     report(&copy, &done, scratch).ok()
 }
 
-fn report(
+pub(super) fn report(
     surface: &surface::Surface,
     done: &Resolved,
     scratch: &ScratchSpace,

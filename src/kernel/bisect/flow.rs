@@ -9,9 +9,16 @@
 //! in vision" (2004).
 
 use std::collections::VecDeque;
+use std::ops::{AddAssign, SubAssign};
+
+/// A whole number as capacity: 32 bits where memory counts, 64 where capacities differ by more.
+pub trait Capacity: Copy + Ord + Default + Into<u64> + AddAssign + SubAssign {}
+
+impl Capacity for u32 {}
+impl Capacity for u64 {}
 
 /// The tree of a node.
-#[derive(Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 enum Root {
     #[default]
     Free,
@@ -24,7 +31,7 @@ const TERMINAL: u8 = 4;
 const ORPHAN: u8 = 5;
 
 /// Position of a node in its tree.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct TreePlace {
     root: Root,
     /// Number of the neighbor that is its parent, [`TERMINAL`] or [`ORPHAN`].
@@ -40,7 +47,7 @@ const IN_NO_TREE: TreePlace =
 
 /// An arc to a node, by which it is that node's arc too: the two of a pair are found from each other without a search.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct FlowArc(u32);
+pub struct FlowArc(u32);
 
 impl FlowArc {
     /// No arc.
@@ -63,31 +70,32 @@ impl FlowArc {
 }
 
 /// A node in one line of the cache: nearly every step needs its arcs and its place.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-struct FlowNode {
+struct FlowNode<C> {
     arcs: [FlowArc; 4],
     /// Residual capacity of each arc, towards the neighbor.
-    residual: [u32; 4],
+    residual: [C; 4],
     /// Residual capacity from the source and to the sink.
-    terminal: [u32; 2],
+    terminal: [C; 2],
     tree: TreePlace,
 }
 
-const _: () = assert!(size_of::<FlowNode>() == 64);
+const _: () = assert!(size_of::<FlowNode<u32>>() == 64);
 
-/// A graph between a source and a sink. Memory: 64 bytes a node, and 8 for the queues.
+/// A graph between a source and a sink. Memory: 64 bytes a node (128 with 64-bit capacities), and 8 for the queues.
 ///
 /// Nodes that are near in the graph should have near numbers: the result is the same, the time is not.
-#[derive(Default)]
-pub(super) struct Graph {
-    nodes: Vec<FlowNode>,
+#[derive(Debug, Default)]
+pub struct Graph<C = u32> {
+    nodes: Vec<FlowNode<C>>,
     active: VecDeque<u32>,
     orphans: VecDeque<u32>,
     time: u32,
 }
 
-impl Graph {
+impl<C: Capacity> Graph<C> {
+    /// Removes all nodes.
     pub fn clear(&mut self) {
         self.nodes.clear();
     }
@@ -95,20 +103,21 @@ impl Graph {
     /// Bytes allocated.
     pub fn bytes(&self) -> u64 {
         let queues = (self.active.capacity() + self.orphans.capacity()) * size_of::<u32>();
-        (queues + self.nodes.capacity() * size_of::<FlowNode>()) as u64
+        (queues + self.nodes.capacity() * size_of::<FlowNode<C>>()) as u64
     }
 
+    /// Number of nodes.
     pub fn n_nodes(&self) -> usize {
         self.nodes.len()
     }
 
     /// Adds a node: its arcs (both of a pair have the same capacity) and its capacities from source and to sink.
-    pub fn push(&mut self, arcs: [FlowArc; 4], capacity: [u32; 4], terminal: [u32; 2]) {
+    pub fn push(&mut self, arcs: [FlowArc; 4], capacity: [C; 4], terminal: [C; 2]) {
         self.nodes.push(FlowNode { arcs, residual: capacity, terminal, tree: IN_NO_TREE });
     }
 
     /// The capacity of arc `k` of a node, before [`Graph::cut`].
-    pub fn capacity(&self, node: u32, k: usize) -> u32 {
+    pub fn capacity(&self, node: u32, k: usize) -> C {
         self.nodes[node as usize].residual[k]
     }
 
@@ -125,10 +134,10 @@ impl Graph {
             let through = (*from).min(*to);
             *from -= through;
             *to -= through;
-            value += u64::from(through);
-            let root = match (*from, *to) {
-                (0, 0) => continue,
-                (0, _) => Root::Sink,
+            value += through.into();
+            let root = match [*from, *to].map(|left| left > C::default()) {
+                [false, false] => continue,
+                [false, true] => Root::Sink,
                 _ => Root::Source,
             };
             let tree = &mut node.tree;
@@ -139,7 +148,7 @@ impl Graph {
             self.tree_mut(node).active = false;
             // The same node continues until nothing grows from it.
             while let Some((from, arc)) = self.grow(node) {
-                value += u64::from(self.augment(from, arc));
+                value += self.augment(from, arc).into();
                 self.adopt_all();
             }
         }
@@ -168,7 +177,7 @@ impl Graph {
 
     /// Residual capacity of the reverse of `arc`.
     #[inline]
-    fn inward(&self, arc: FlowArc) -> u32 {
+    fn inward(&self, arc: FlowArc) -> C {
         self.nodes[arc.node() as usize].residual[arc.back()]
     }
 
@@ -197,7 +206,7 @@ impl Graph {
                 Root::Source => node.residual[k],
                 _ => self.inward(arc),
             };
-            if outward == 0 {
+            if outward == C::default() {
                 continue;
             }
             let there = self.tree_mut(arc.node());
@@ -219,7 +228,7 @@ impl Graph {
     }
 
     /// Fills the path through arc `arc` of `from`; nodes behind saturated arcs lose their parent.
-    fn augment(&mut self, from: u32, arc: usize) -> u32 {
+    fn augment(&mut self, from: u32, arc: usize) -> C {
         let to = self.arc(from, arc).node();
         let mut pushed = self.nodes[from as usize].residual[arc];
         for start in [from, to] {
@@ -245,7 +254,7 @@ impl Graph {
                 let side = usize::from(node.tree.root == Root::Sink);
                 if node.tree.parent == TERMINAL {
                     node.terminal[side] -= pushed;
-                    if node.terminal[side] == 0 {
+                    if node.terminal[side] == C::default() {
                         self.orphan(at);
                     }
                     break;
@@ -257,7 +266,7 @@ impl Graph {
                 } else {
                     self.push_through(at, k, pushed)
                 };
-                if left == 0 {
+                if left == C::default() {
                     self.orphan(at);
                 }
                 at = up.node();
@@ -268,7 +277,7 @@ impl Graph {
 
     /// Returns the residual capacity.
     #[inline]
-    fn push_through(&mut self, from: u32, k: usize, amount: u32) -> u32 {
+    fn push_through(&mut self, from: u32, k: usize, amount: C) -> C {
         let node = &mut self.nodes[from as usize];
         let arc = node.arcs[k];
         node.residual[k] -= amount;
@@ -295,8 +304,8 @@ impl Graph {
         let root = node.tree.root;
         // Residual capacity through arc `k` from the neighbor, seen from the terminal of the tree.
         let fits = |graph: &Self, k: usize| match root {
-            Root::Source => graph.inward(node.arcs[k]) > 0,
-            _ => node.residual[k] > 0,
+            Root::Source => graph.inward(node.arcs[k]) > C::default(),
+            _ => node.residual[k] > C::default(),
         };
         let mut best = None::<(u32, usize)>;
         for (k, arc) in node.arcs.into_iter().enumerate() {
@@ -419,7 +428,7 @@ mod tests {
             }
             let terminal: Vec<[u32; 2]> =
                 (0..n).map(|_| [next(3) as u32 * 7, next(3) as u32 * 9]).collect();
-            let mut graph = Graph::default();
+            let mut graph = Graph::<u32>::default();
             for k in 0..n {
                 let arcs = neighbor[k].map(|other| {
                     if other == NO_NODE {

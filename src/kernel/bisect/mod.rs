@@ -30,6 +30,7 @@ mod write_child;
 mod zone;
 
 pub use axes::principal_axes;
+pub use flow::{Capacity, FlowArc, Graph};
 pub use interface::InterfaceReport;
 pub use load::{SizeFn, load_of};
 pub use load_profile::ChosenPlane;

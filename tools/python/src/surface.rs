@@ -6,8 +6,11 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde_json::json;
-use tetdb::{CancelToken, CellArrays, DefectPlace, Seed, SeedKind};
+use tetdb::{
+    CancelToken, CellArrays, DefectPlace, RepairKind, Seed, SeedKind, Settings, Word as _,
+};
 
+use crate::failure::Failure;
 use crate::sizes::{LengthWords, length};
 use crate::watched::watched;
 
@@ -173,6 +176,17 @@ impl Surface {
 
     fn repaired(&self, py: Python<'_>, weld: Option<f64>) -> PyResult<Self> {
         made(py, || tetdb::Surface::clone(&self.inner).repaired(weld))
+    }
+
+    /// The surface repaired in this way, and what was done: a list of steps as JSON.
+    fn repaired_by(&self, py: Python<'_>, how: &str) -> PyResult<(Self, String)> {
+        let kind = RepairKind::from_word(how)
+            .ok_or_else(|| Failure::internal("a repair is not known").raised(py))?;
+        let token = CancelToken::new();
+        let settings = Settings::new().cancel(&token);
+        let work = || Ok(tetdb::Surface::clone(&self.inner).repaired_by(kind, &settings)?);
+        let (surface, steps) = watched(py, &token, None, work)?;
+        Ok((Self { inner: Arc::new(surface) }, json!(steps).to_string()))
     }
 
     fn refined(&self, py: Python<'_>, hsiz: (f64, bool)) -> PyResult<Self> {

@@ -204,6 +204,32 @@ def test_surfaces_are_checked_repaired_and_refined(tmp_path: Path) -> None:
     assert estimate.tets > surface.estimate(hsiz="20%").tets and estimate.subdomains == 1
 
 
+def test_holes_are_closed_and_crossings_resolved(tmp_path: Path) -> None:
+    corners = np.array([[c & 1, c >> 1 & 1, c >> 2] for c in range(8)], dtype=float)
+    walls = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+    box = tetdb.Surface(corners, np.array([t for a, b, c, d in walls for t in ((a, b, c), (a, c, d))]))
+    open_ = tetdb.Surface(box.points, box.triangles[2:])
+    closed = open_.repaired("winding")
+    (step,) = closed.repairs
+    hole = step["winding"]["holes"][0]
+    assert hole["label"] == "closed-hole-1" and hole["area"] == pytest.approx(1) and closed.check().ok
+    assert (closed.labels == "closed-hole-1").sum() == 2 and closed.check().volume == pytest.approx(1)
+    crossing = tetdb.Surface(np.concatenate([box.points, box.points + (0.5, 0.25, 0.375)]),
+                             np.concatenate([box.triangles, box.triangles + len(box.points)]))
+    resolved = crossing.repaired("resolve")
+    assert resolved.repairs[0]["resolve"]["pairs"] > 0 and resolved.check().ok
+    united = crossing.repaired("auto")
+    assert [*united.repairs[-1]] == ["winding"] and united.check().volume == pytest.approx(2 - 0.5 * 0.75 * 0.625)
+    with tetdb.mesh(united, tmp_path / "u", hsiz="30%") as store:
+        assert store.verify().ok
+    assert box.repaired("auto").repairs == [] == box.repairs
+    with pytest.raises(tetdb.SurfaceError, match="goes around nothing"):
+        tetdb.Surface(box.points, box.triangles[:2]).repaired("winding")
+    for bad in (lambda: box.repaired("magic"), lambda: box.repaired("auto", weld=1e-6), lambda: box.repaired([1])):
+        with pytest.raises(tetdb.TetdbError):
+            bad()
+
+
 def test_a_store_shows_itself(parts: tetdb.Store, tmp_path: Path) -> None:
     assert "data:image/png;base64," in parts._repr_html_()
     parts.snapshot(tmp_path / "s.svg", color="quality", plane=((0.5, 0.5, 0.5), (1, 0, 0)), crinkle=True)

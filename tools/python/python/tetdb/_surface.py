@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import warnings
@@ -17,6 +18,8 @@ from ._errors import SurfaceError, TetdbError
 from ._sizes import Length, Size, length
 
 __all__ = ["CheckReport", "Defects", "Estimate", "Surface", "sample"]
+
+REPAIRS = ("resolve", "winding", "auto")
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +125,7 @@ class Surface:
     _inner: _native.Surface
     _parts: tuple[Callable[..., Surface], tuple[Any, ...]] | None = None
     """How it was embedded, and what: its triangles alone do not say which are sheets."""
+    _repairs: tuple[dict[str, Any], ...] | list[dict[str, Any]] = ()
 
     def __init__(
         self,
@@ -229,17 +233,41 @@ class Surface:
         ok = said["n_defects"] == 0
         return CheckReport(ok=ok, defects=Defects(codes, triangles, places), edges=edges, **said)
 
-    def repaired(self, weld: float | None = None) -> Surface:
-        """Without triangles of no area and repeated ones, divided at T-junctions, turned alike.
+    def repaired(self, how: str | float | None = None, weld: float | None = None) -> Surface:
+        """The same surface repaired; :attr:`repairs` of the result says what was done.
 
         Parameters
         ----------
+        how : str, optional
+            ``"resolve"`` divides crossing triangles along their intersections. ``"winding"`` then closes holes, turns shells outward and
+            unites parts that overlap; new triangles are labeled ``closed-hole-1`` and so on. ``"auto"`` takes the first of joining near
+            points, ``"resolve"`` and ``"winding"`` that leaves no defect. Without it, triangles of no area and repeated ones are dropped,
+            triangles divided at T-junctions, and all turned alike.
         weld : float, optional
-            Points nearer than this share of the box diagonal are joined; up to 0.01.
+            Without `how`: points nearer than this share of the box diagonal are joined; up to 0.01.
+
+        Raises
+        ------
+        SurfaceError
+            ``nothing-filled`` where the surface goes around nothing; ``self-intersection`` where rounding makes new crossings.
         """
+        if isinstance(how, str):
+            if how not in REPAIRS or weld is not None:
+                raise TetdbError("usage", f"{how!r} is no repair" if weld is None else "weld is for repairs without `how`", "how",
+                                 f"one of {', '.join(REPAIRS)}")
+            native, steps = self._inner.repaired_by(how)
+            surface = self._of(native)
+            surface._repairs = json.loads(steps)
+            return surface
+        weld = how if weld is None else weld
         if weld is not None and not isinstance(weld, (int, float)):
             raise TetdbError("bad-size", f"{weld!r} is no share of the box diagonal", "weld")
         return self._of(self._inner.repaired(weld))
+
+    @property
+    def repairs(self) -> list[dict[str, Any]]:
+        """What :meth:`repaired` did, step by step: each has one key, ``weld``, ``resolve`` or ``winding``, with counts, areas and volumes."""
+        return copy.deepcopy(list(self._repairs))
 
     def refined(self, hsiz: Length) -> Surface:
         """The same surface with edges of `hsiz` at most; new vertices lie on the old triangles."""

@@ -1,0 +1,159 @@
+//! Open and doubled surfaces closed where winding numbers say what is inside.
+//!
+//! ```text
+//!      shells seen from outside                                  `shells`
+//!   -> triangles that touch in common vertices and edges alone   `resolve`, where they do not
+//!   -> tetrahedra between them                                   `coarse`
+//!   -> winding numbers of the tetrahedra                         `winding`
+//!   -> inside and outside                                        `sides`: a minimum cut
+//!   -> triangles and faces between the two                       `patches`
+//! ```
+//!
+//! No triangle of the input is altered: it stays, is turned, or goes where it does not lie between inside and outside. Holes are closed by
+//! faces of the tetrahedra. Where triangles cross, they are divided first.
+
+mod coarse;
+mod patches;
+mod shells;
+mod sides;
+mod winding;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeSet;
+
+use tetdb_base::geom::{Point, counted};
+use tetdb_base::storage::ScratchSpace;
+use tetdb_base::surface::{Defect, Surface, closedness, repair_bytes, validate_with};
+use tetdb_kernel::boundary::BoundaryError;
+
+use crate::resolve::{ResolveError, Resolved, resolve};
+pub use coarse::Watcher;
+use coarse::coarse;
+pub use patches::{ClosedHole, LABELS_MAX};
+use patches::{Kept, keep};
+use shells::turn_shells;
+use sides::choose_sides;
+use winding::WindingTree;
+
+/// Places listed at most.
+const LISTED_MAX: usize = 16;
+
+/// Result of [`close`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Closed {
+    /// What was done to crossings before.
+    pub resolved: Resolved,
+    /// Holes that were closed, the largest first.
+    pub holes: Vec<ClosedHole>,
+    /// Triangles added, which close the holes.
+    pub triangles_added: usize,
+    /// Vertices added inside holes; those of divided triangles are counted by `resolved`.
+    pub points_added: usize,
+    /// Triangles turned outward.
+    pub turned: usize,
+    /// Triangles dropped with inside on both sides.
+    pub dropped_inside: usize,
+    /// Triangles dropped with outside on both sides.
+    pub dropped_outside: usize,
+    /// Triangles dropped that another one gives from the other side.
+    pub dropped_repeated: usize,
+    /// Volume weighted with the winding number.
+    pub volume_by_winding: f64,
+    /// Volume enclosed now.
+    pub volume: f64,
+    /// Volume with a winding number between 0.3 and 0.7: there the choice is open to doubt.
+    pub volume_doubtful: f64,
+}
+
+impl Closed {
+    /// Area of all holes.
+    pub fn hole_area(&self) -> f64 {
+        self.holes.iter().map(|hole| hole.area).sum()
+    }
+}
+
+/// Reasons why a surface is not closed.
+#[derive(Debug, thiserror::Error)]
+pub enum CloseError {
+    /// Crossings stay.
+    #[error(transparent)]
+    Resolve(#[from] ResolveError),
+    /// Triangles cannot be made faces of tetrahedra.
+    #[error(transparent)]
+    Boundary(#[from] BoundaryError),
+    /// No place has a winding number above one half.
+    #[error("the surface goes around nothing: no place has a winding number above one half")]
+    NothingInside,
+    /// The result has defects.
+    #[error("the closed surface has {}", counted(*.n, "[defect|defects]"))]
+    Unsound {
+        /// Number of defects.
+        n: u64,
+        /// Places of some.
+        places: Vec<Point>,
+    },
+}
+
+/// Bytes of memory that [`close`] holds, the surface among them.
+pub fn close_bytes(surface: &Surface) -> u64 {
+    /// Seven tetrahedra at 32 bytes in the mesh, 136 in the graph, 32 for the costs of faces and 16 for the winding number.
+    const VERTEX: u64 = 1600;
+    repair_bytes(surface) + VERTEX * surface.n_vertices() as u64
+}
+
+/// Makes a closed surface of one with open edges, doubled or turned shells, or parts that overlap.
+///
+/// Inside is where the surface goes around more than half a time, either way. Triangles between inside and outside stay, turned
+/// outward, with their labels; the others are dropped. Faces of Delaunay tetrahedra close the holes, with labels `closed-hole-1` and so
+/// on. Effects: vertices and triangles are renumbered. The result is the same for any number of threads. Memory: [`close_bytes`]. A
+/// scratch file that fails unwinds, as a cancelled run does ([`attempt`](tetdb_base::storage::attempt)).
+///
+/// # Errors
+/// [`CloseError`]; the surface is then between two steps.
+pub fn close(
+    surface: &mut Surface,
+    scratch: &ScratchSpace,
+    watch: &Watcher,
+) -> Result<Closed, CloseError> {
+    watch("resolve crossings", 0, 0);
+    let shells_turned = turn_shells(surface);
+    let resolved = resolve(surface, scratch)?;
+    if surface.n_triangles() == 0 {
+        return Err(CloseError::NothingInside);
+    }
+    let mut mesh = coarse(surface, watch)?;
+    let mut sides = choose_sides(&mut mesh, &WindingTree::new(surface, |_| true), watch);
+    let two_sided = closedness(surface).two_sided;
+    if sides.volume == 0.0 && !two_sided.is_empty() {
+        // Walls given from both sides go around nothing.
+        let seconds: BTreeSet<u32> = two_sided.into_iter().map(|[_, second]| second).collect();
+        let tree = WindingTree::new(surface, |t| !seconds.contains(&t));
+        sides = choose_sides(&mut mesh, &tree, watch);
+    }
+    if sides.volume == 0.0 {
+        return Err(CloseError::NothingInside);
+    }
+    let Kept { turned, dropped_inside, dropped_outside, dropped_repeated, holes, points_added } =
+        keep(surface, &mut mesh, &sides);
+    drop(mesh);
+    let found = validate_with(surface, scratch);
+    if found.n_defects > 0 {
+        let places = found.defects.iter().filter_map(Defect::at).take(LISTED_MAX).collect();
+        return Err(CloseError::Unsound { n: found.n_defects, places });
+    }
+    Ok(Closed {
+        resolved,
+        triangles_added: holes.iter().map(|hole| hole.triangles).sum(),
+        holes,
+        points_added,
+        turned: turned + shells_turned,
+        dropped_inside,
+        dropped_outside,
+        dropped_repeated,
+        volume_by_winding: sides.volume_by_winding,
+        volume: sides.volume,
+        volume_doubtful: sides.volume_doubtful,
+    })
+}
