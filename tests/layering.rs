@@ -27,7 +27,7 @@ const HOUSE: &[(&str, &[&[&str]])] = &[
             &["bisect"],
         ],
     ),
-    ("repair", &[&["resolve", "remesh"]]),
+    ("repair", &[&["resolve", "remesh", "wrap"]]),
     ("store", &[&["sealed"], &["store"], &["query", "audit"]]),
     ("io", &[&["read", "write"]]),
     ("engine", &[&["pipeline"], &["view"], &["api"]]),

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`resolve`] | crossing triangles are divided where they cross |
 //! | [`remesh`] | needles vanish, and every point stays within a tolerance |
+//! | [`wrap`] | a closed surface around anything, at an offset |
 //!
 //! A surface goes in and a surface comes out, with a report of what was changed. Nothing here reads or writes files. Programs use the
 //! crate `tetdb`; the items here may change at any time.
@@ -12,3 +13,4 @@
 
 pub mod remesh;
 pub mod resolve;
+pub mod wrap;
