@@ -200,7 +200,8 @@ impl<'a> Flood<'a> {
             return Some(to);
         }
         let length = from.distance(to);
-        let (direction, end) = ((to - from) / length, length - beyond);
+        // The ball around the end that holds no point of the offset is not marched through; its border is.
+        let (direction, end) = ((to - from) / length, length - beyond + self.tolerance);
         let mut at = (self.reach[outside as usize] - self.level).abs();
         let mut within = self.reach[outside as usize] + at;
         for _ in 0..STEPS_MAX {
