@@ -28,6 +28,8 @@ pub enum Origin {
     SheetsFrom(usize),
     /// Crossing triangles were divided; what was done, in words. The fingerprint is that of the divided surface.
     Resolved(String),
+    /// A closed surface around the triangles took their place; gap and offset. The fingerprint is that of the wrap.
+    Wrapped(String),
     /// All parts that are not closed are sheets.
     OpenParts,
     /// Embedded edges.
@@ -54,6 +56,7 @@ const COPY: &str = "store:surface.obj";
 const SHEET: &str = "sheet:";
 const SHEETS_FROM: &str = "sheets-from:";
 const RESOLVED: &str = "resolved:";
+const WRAPPED: &str = "wrapped:";
 const OPEN_PARTS: &str = "open-parts:";
 const EDGES: &str = "edges:";
 const POINTS: &str = "points:";
@@ -79,6 +82,8 @@ impl Source {
             Origin::OpenParts
         } else if let Some(rest) = after(RESOLVED) {
             Origin::Resolved(rest.to_owned())
+        } else if let Some(rest) = after(WRAPPED) {
+            Origin::Wrapped(rest.to_owned())
         } else if let Some(rest) = after(SHEETS_FROM) {
             Origin::SheetsFrom(rest.parse().ok()?)
         } else if let Some(rest) = after(SHEET) {
@@ -107,6 +112,7 @@ impl Source {
             Origin::Sheet(file) => named(SHEET, file),
             Origin::SheetsFrom(first) => format!("{SHEETS_FROM}{first}"),
             Origin::Resolved(what) => format!("{RESOLVED}{what}"),
+            Origin::Wrapped(what) => format!("{WRAPPED}{what}"),
             Origin::OpenParts => OPEN_PARTS.to_owned(),
             Origin::Edges(file) => named(EDGES, file),
             Origin::Points(file) => named(POINTS, file),
@@ -149,6 +155,7 @@ mod tests {
             "sheets-from:120",
             "open-parts:",
             "resolved:56 pairs",
+            "wrapped:gap=1e-2,offset=1e-3",
             "edges:well=/home/a/wells.obj",
             "points:sensor=/home/a/p.csv",
             "wires:12,3",

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::args::CheckArgs;
+use super::args::{CheckArgs, RepairArgs};
 use super::check_report::Printed;
 use super::config;
 use super::console::Console;
@@ -14,7 +14,8 @@ use super::memory;
 use super::words;
 use tetdb_engine::api::targets::check_target;
 use tetdb_engine::api::{
-    Code, RepairKind, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short, typed,
+    Code, RepairKind, RepairReport, Surface, SurfaceReport, SurfaceWrap, WELD_SHARE_MAX, short,
+    typed, wrap_in_words,
 };
 
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
@@ -32,8 +33,14 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // A check writes no temporary files next to its input.
     let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
     let options = typed(config::inside_of(&args.inside))?;
-    let mut surface =
-        input::load_with(&args.surfaces, None, &args.sheets, &options, &settings, console)?;
+    let mut surface = input::load_with(
+        &args.surfaces,
+        &RepairArgs::default(),
+        &args.sheets,
+        &options,
+        &settings,
+        console,
+    )?;
     if args.repair.is_none() {
         surface = surface.inside_settled(options.embed_outside, &settings)?;
     }
@@ -48,6 +55,11 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
         let done;
         (surface, done) = surface.resolve_reported(&settings)?;
         resolve = Some(done);
+    }
+    if args.repair == Some(Some(RepairKind::Wrap)) {
+        let (wrap, done) = surface.wrapped_with(&SurfaceWrap::default(), &settings)?;
+        console.note(&format!("note: wrapped: {}", wrap_in_words(&done)));
+        surface = wrap;
     }
     let report = surface.report(&settings, console.is_verbose())?;
     let written = write_files(args, &surface, &report, console)?;

@@ -71,6 +71,7 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     let surfaces = info.surfaces.iter().map(|s| match (s.path.as_str(), s.path.split_once(':')) {
         (COPY, _) => "a copy in the store of its surface".to_owned(),
         (_, Some(("resolved", what))) => format!("crossings resolved ({what})"),
+        (_, Some(("wrapped", what))) => format!("wrapped ({what})"),
         (path, _) => path.to_owned(),
     });
     let surfaces: Vec<String> = surfaces.collect();

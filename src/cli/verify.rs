@@ -28,7 +28,7 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
             let options = MeshOptions::default();
             let surface = input::load_with(
                 &args.against,
-                args.repair.repair,
+                &args.repair,
                 &args.sheets,
                 &options,
                 &settings,

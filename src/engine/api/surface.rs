@@ -335,6 +335,13 @@ impl Surface {
         })
     }
 
+    /// Checks that [`Surface::write`] knows the format of a file of that name.
+    ///
+    /// Errors: `unknown-format`.
+    pub fn check_format(out: impl AsRef<Path>) -> Result<(), Error> {
+        Ok(write::check_surface_format(out.as_ref())?)
+    }
+
     /// Reads files, or generates one sample, within the memory of `scratch`.
     pub(super) fn load_within(words: &[String], scratch: &ScratchSpace) -> Result<Self, Error> {
         let samples = words.iter().filter(|word| word.starts_with(PREFIX)).count();
@@ -453,6 +460,7 @@ impl Surface {
                 self.with_wires(Path::new(file), WireKind::Points, Some(name), scratch)
             }
             Origin::Resolved(_) => Ok(self.resolved_in(scratch)?.0),
+            Origin::Wrapped(text) => self.wrapped_again(text, scratch),
             Origin::OpenParts | Origin::File(_) | Origin::Sample(_) | Origin::Copy => {
                 Ok(self.open_parts_in(scratch)?.0)
             }
@@ -465,13 +473,13 @@ impl Surface {
         Self::of(inner, vec![source])
     }
 
-    /// The record of a copy in the store; that crossings were resolved stays on record.
+    /// The record of a copy in the store; repairs stay on record.
     pub(super) fn copied(&self, inner: &surface::Surface) -> Vec<Source> {
         let own = given(inner);
         let of_copy = |s: &Source| Source { hash: own.hash, ..s.clone() };
-        let mut resolved = self.sources.iter().filter(|s| matches!(s.origin, Origin::Resolved(_)));
-        let resolved = resolved.next().map(of_copy);
-        std::iter::once(own).chain(resolved).collect()
+        let is_repair = |s: &&Source| matches!(s.origin, Origin::Resolved(_) | Origin::Wrapped(_));
+        let repairs = self.sources.iter().filter(is_repair).map(of_copy);
+        std::iter::once(own.clone()).chain(repairs).collect()
     }
 
     fn of(inner: surface::Surface, sources: Vec<Source>) -> Self {

@@ -22,10 +22,13 @@ use tetdb_schema::word::Word;
 pub enum RepairKind {
     /// Crossing triangles are divided where they cross; see [`Surface::resolved`].
     Resolve,
+    /// A closed surface around all triangles takes their place; see [`Surface::wrapped`].
+    Wrap,
 }
 
 impl Word for RepairKind {
-    const WORDS: &'static [(Self, &'static str)] = &[(Self::Resolve, "resolve")];
+    const WORDS: &'static [(Self, &'static str)] =
+        &[(Self::Resolve, "resolve"), (Self::Wrap, "wrap")];
 }
 
 /// What was done to crossing triangles. Serialized, it is the key `resolve` of `tetdb check --json`.
