@@ -30,6 +30,8 @@ const TOLERANCE: f64 = 5e-4;
 const SPACING: f64 = 1e-2;
 /// Steps of a march at most. Those that graze the offset take tens.
 const STEPS_MAX: u32 = 200;
+/// Distances beyond this many offsets are lower bounds.
+const EXACT: f64 = 4.0;
 /// Attempts to move a point from inside the offset onto it.
 const PUSHES_MAX: u32 = 8;
 /// Size of the first tetrahedron against the box diagonal: its faces are three and a half such lengths away.
@@ -162,26 +164,26 @@ impl<'a> Flood<'a> {
         if !center.is_finite() {
             center = corners.iter().sum::<Point>() * 0.25;
         }
-        let nearest = self.oracle.nearest(center, f64::INFINITY);
+        let nearest = self.about(center, f64::INFINITY);
         let across = self.mesh.tets[t as usize].across[usize::from(gate.face)];
         if across != NONE
-            && let Some(p) = self.on_segment(across >> 2, center, nearest.distance)
+            && let Some(p) = self.on_segment(across >> 2, center, nearest.least)
             && self.insert(p, gate)
         {
             return;
         }
         let is_free =
-            nearest.distance > radius * (1.0 + 1e-9) || !self.oracle.may_meet(&Cell::new(corners));
+            nearest.least > radius * (1.0 + 1e-9) || !self.oracle.may_meet(&Cell::new(corners));
         if is_free {
             self.is_outside[t as usize] = true;
-            self.reach[t as usize] = nearest.distance;
+            self.reach[t as usize] = nearest.least;
             self.push_gates(t);
             return;
         }
         let face = self.mesh.face(t, usize::from(gate.face)).map(|v| self.mesh.points[v as usize]);
         let [a, b, c] = face;
         for (from, nearest) in [(center, Some(nearest)), ((a + b + c) / 3.0, None)] {
-            let nearest = nearest.unwrap_or_else(|| self.oracle.nearest(from, f64::INFINITY));
+            let nearest = nearest.unwrap_or_else(|| self.about(from, f64::INFINITY));
             let outward = (b - a).cross(c - a).normalize_or_zero();
             if let Some(p) = self.above(from, nearest, outward)
                 && self.insert(p, gate)
@@ -203,32 +205,34 @@ impl<'a> Flood<'a> {
         // The ball around the end that holds no point of the offset is not marched through; its border is.
         let (direction, end) = ((to - from) / length, length - beyond + self.tolerance);
         let mut at = (self.reach[outside as usize] - self.level).abs();
-        let mut within = self.reach[outside as usize] + at;
+        // What was found there may have been a tenth farther than the nearest.
+        let mut within = 1.2 * self.reach[outside as usize] + at;
         for _ in 0..STEPS_MAX {
             // Also where a center is not a number.
             if !(at < end) {
                 return None;
             }
             let p = from + direction * at;
-            let distance = self.oracle.nearest(p, within * (1.0 + 1e-9)).distance;
-            let step = (distance - self.level).abs();
+            let nearest = self.about(p, within * (1.0 + 1e-9));
+            let step = (nearest.least - self.level).abs();
             if step <= self.tolerance {
                 return Some(p);
             }
             at += step;
-            within = distance + step;
+            within = nearest.distance + step;
         }
         None
+    }
+
+    fn about(&self, p: Point, within: f64) -> Nearest {
+        self.oracle.about_nearest(p, within, EXACT * self.level)
     }
 
     /// A point on the offset above the input point nearest to `p`.
     fn above(&self, p: Point, nearest: Nearest, outward: Point) -> Option<Point> {
         let mut direction = (p - nearest.at).try_normalize().unwrap_or(outward);
         let mut x = nearest.at + direction * self.level;
-        if nearest.distance > self.level {
-            return Some(x);
-        }
-        // From inside the offset the way out may lead to other parts of the input.
+        // What is far away may not be the nearest, and from inside the offset the way out may lead to other parts of the input.
         for _ in 0..PUSHES_MAX {
             let now = self.oracle.nearest(x, 2.0 * self.level);
             if (now.distance - self.level).abs() <= self.tolerance {

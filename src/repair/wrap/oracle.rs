@@ -10,6 +10,8 @@ use super::apart::Cell;
 
 /// Triangles of a leaf at most.
 const LEAF: usize = 4;
+/// Square of the least distance, as a share of the square of what is found far away: a tenth less.
+const SLACK: f64 = 0.81;
 /// Ranges below this many triangles are sorted by one thread.
 const ALONE: usize = 1 << 13;
 /// Triangles whose height is below this share of their length are thin: signs of products may be rounding there.
@@ -33,6 +35,8 @@ pub struct Nearest {
     pub at: Point,
     /// Its distance.
     pub distance: f64,
+    /// No point of the input is nearer than this.
+    pub least: f64,
     /// The triangle it is on.
     pub triangle: u32,
 }
@@ -77,25 +81,39 @@ impl Oracle {
 
     /// The input point nearest to `p`; `within` is a distance at which there surely is one.
     pub fn nearest(&self, p: Point, within: f64) -> Nearest {
-        let mut best = Nearest { at: p, distance: within * within, triangle: 0 };
+        self.about_nearest(p, within, f64::INFINITY)
+    }
+
+    /// Like [`Oracle::nearest`], but beyond the distance `exact` any point that is at most a tenth farther than the nearest may be found.
+    ///
+    /// Far from the input, and at centers of round parts, the nearest is hard to tell from others; there a look at all would be needed.
+    pub fn about_nearest(&self, p: Point, within: f64, exact: f64) -> Nearest {
+        let exact = exact * exact;
+        // Squares of distances from here on.
+        let bound = |best: f64| if best > exact { best * SLACK } else { best };
+        let mut best = Nearest { at: p, distance: within * within, least: 0.0, triangle: 0 };
+        let mut most = bound(best.distance);
         let mut stack = [(0usize, 0.0f64); 64];
         stack[0] = (1, 0.0);
         let mut n = 1;
         while n > 0 {
             n -= 1;
             let (mut node, least) = stack[n];
-            if least > best.distance {
+            if least > most {
                 continue;
             }
             while node >> self.depth == 0 {
-                let two = [2 * node, 2 * node + 1].map(|c| (c, distance2(&self.boxes[c], p)));
-                let (near, far) = if two[1].1 < two[0].1 { (1, 0) } else { (0, 1) };
-                if two[far].1 <= best.distance {
-                    stack[n] = two[far];
+                let mut near = (2 * node, distance2(&self.boxes[2 * node], p));
+                let mut far = (2 * node + 1, distance2(&self.boxes[2 * node + 1], p));
+                if far.1 < near.1 {
+                    std::mem::swap(&mut near, &mut far);
+                }
+                if far.1 <= most {
+                    stack[n] = far;
                     n += 1;
                 }
-                node = two[near].0;
-                if two[near].1 > best.distance {
+                node = near.0;
+                if near.1 > most {
                     node = 0;
                     break;
                 }
@@ -110,10 +128,12 @@ impl Oracle {
                 };
                 let square = at.distance_squared(p);
                 if square <= best.distance {
-                    best = Nearest { at, distance: square, triangle: self.ids[i] };
+                    best = Nearest { at, distance: square, least: 0.0, triangle: self.ids[i] };
+                    most = bound(square);
                 }
             }
         }
+        best.least = most.sqrt();
         best.distance = best.distance.sqrt();
         best
     }
@@ -189,6 +209,7 @@ fn divide(ids: &mut [u32], middles: &[Point], range: Range) {
     }
 }
 
+#[inline(always)]
 fn distance2(b: &Aabb, p: Point) -> f64 {
     (b.low - p).max(p - b.high).max(Point::ZERO).length_squared()
 }
@@ -202,6 +223,7 @@ fn is_thin([a, b, c]: &[Point; 3]) -> bool {
 /// The nearest point of a triangle that is not thin.
 ///
 /// Source: C. Ericson, "Real-Time Collision Detection" (2005), section 5.1.5: regions of corners and edges by their products.
+#[inline]
 fn nearest_on(t: &[Point; 3], p: Point) -> Point {
     let [a, b, c] = *t;
     let (ab, ac, ap) = (b - a, c - a, p - a);
@@ -272,6 +294,9 @@ mod tests {
                 let least = all.fold(f64::INFINITY, f64::min);
                 assert!((found.distance - least).abs() < 1e-12, "{} {least}", found.distance);
                 assert!((found.at.distance(p) - least).abs() < 1e-12);
+                let about = oracle.about_nearest(p, f64::INFINITY, 0.1);
+                assert!(about.least <= least + 1e-12 && least <= about.distance + 1e-12);
+                assert!(about.distance < 1.12 * about.least || about.distance <= 0.1);
             }
         }
     }
