@@ -182,8 +182,9 @@ impl<'a> Flood<'a> {
         }
         let face = self.mesh.face(t, usize::from(gate.face)).map(|v| self.mesh.points[v as usize]);
         let [a, b, c] = face;
-        for (from, nearest) in [(center, Some(nearest)), ((a + b + c) / 3.0, None)] {
-            let nearest = nearest.unwrap_or_else(|| self.about(from, f64::INFINITY));
+        let within = nearest.distance * (1.0 + 1e-9);
+        for (from, within) in [(center, within), ((a + b + c) / 3.0, f64::INFINITY)] {
+            let nearest = self.oracle.nearest(from, within);
             let outward = (b - a).cross(c - a).normalize_or_zero();
             if let Some(p) = self.above(from, nearest, outward)
                 && self.insert(p, gate)
@@ -232,7 +233,10 @@ impl<'a> Flood<'a> {
     fn above(&self, p: Point, nearest: Nearest, outward: Point) -> Option<Point> {
         let mut direction = (p - nearest.at).try_normalize().unwrap_or(outward);
         let mut x = nearest.at + direction * self.level;
-        // What is far away may not be the nearest, and from inside the offset the way out may lead to other parts of the input.
+        if nearest.distance > self.level {
+            return Some(x);
+        }
+        // From inside the offset the way out may lead to other parts of the input.
         for _ in 0..PUSHES_MAX {
             let now = self.oracle.nearest(x, 2.0 * self.level);
             if (now.distance - self.level).abs() <= self.tolerance {
