@@ -32,6 +32,8 @@ const SPACING: f64 = 1e-2;
 const STEPS_MAX: u32 = 200;
 /// Distances beyond this many offsets are lower bounds.
 const EXACT: f64 = 4.0;
+/// Farthest that the input can be, against the bound.
+const FARTHER: f64 = 1.2;
 /// Attempts to move a point from inside the offset onto it.
 const PUSHES_MAX: u32 = 8;
 /// Size of the first tetrahedron against the box diagonal: its faces are three and a half such lengths away.
@@ -164,8 +166,8 @@ impl<'a> Flood<'a> {
         if !center.is_finite() {
             center = corners.iter().sum::<Point>() * 0.25;
         }
-        let nearest = self.about(center, f64::INFINITY);
         let across = self.mesh.tets[t as usize].across[usize::from(gate.face)];
+        let nearest = self.about(center, self.within(across, center));
         if across != NONE
             && let Some(p) = self.on_segment(across >> 2, center, nearest.least)
             && self.insert(p, gate)
@@ -206,8 +208,7 @@ impl<'a> Flood<'a> {
         // The ball around the end that holds no point of the offset is not marched through; its border is.
         let (direction, end) = ((to - from) / length, length - beyond + self.tolerance);
         let mut at = (self.reach[outside as usize] - self.level).abs();
-        // What was found there may have been a tenth farther than the nearest.
-        let mut within = 1.2 * self.reach[outside as usize] + at;
+        let mut within = FARTHER * self.reach[outside as usize] + at;
         for _ in 0..STEPS_MAX {
             // Also where a center is not a number.
             if !(at < end) {
@@ -223,6 +224,17 @@ impl<'a> Flood<'a> {
             within = nearest.distance + step;
         }
         None
+    }
+
+    /// A distance from `p` at which the input surely is, by that from the center of an outside cell.
+    fn within(&self, across: u32, p: Point) -> f64 {
+        if across == NONE {
+            return f64::INFINITY;
+        }
+        let from = circumsphere(self.mesh.corners(across >> 2)).0;
+        let within = FARTHER * self.reach[across as usize >> 2] + from.distance(p);
+        // Infinite also where a center is not a number.
+        if within > 0.0 { within } else { f64::INFINITY }
     }
 
     fn about(&self, p: Point, within: f64) -> Nearest {

@@ -15,7 +15,7 @@ const SLACK: f64 = 0.81;
 /// Ranges below this many triangles are sorted by one thread.
 const ALONE: usize = 1 << 13;
 /// Triangles whose height is below this share of their length are thin: signs of products may be rounding there.
-const THIN: f64 = 1e-4;
+const THIN: f64 = 1e-5;
 
 /// A binary tree of boxes over triangles; edges and points are triangles with equal corners.
 ///
@@ -258,12 +258,32 @@ fn nearest_on(t: &[Point; 3], p: Point) -> Point {
 }
 
 /// The same for thin ones: of the points on the face and on the edges the nearest.
+#[inline]
 fn nearest_on_thin(t: &[Point; 3], p: Point) -> Point {
     let [a, b, c] = *t;
-    let edge = |from: Point, to: Point| nearest_point([from, to, to], p);
-    let all = [edge(a, b), edge(b, c), edge(c, a), nearest_point(*t, p)];
-    let nearer = |x: Point, y: Point| if p.distance(y) < p.distance(x) { y } else { x };
-    all.into_iter().filter(|x| x.is_finite()).reduce(nearer).unwrap_or(a)
+    let mut best = (a.distance_squared(p), a);
+    for (from, to) in [(a, b), (b, c), (c, a)] {
+        let along = to - from;
+        let share = (p - from).dot(along) / along.length_squared();
+        // Not a number where the edge has no length.
+        if share > 0.0 {
+            let at = if share < 1.0 { from + along * share } else { to };
+            let square = at.distance_squared(p);
+            if square < best.0 {
+                best = (square, at);
+            }
+        }
+    }
+    let n = (b - a).cross(c - a);
+    let height = n.dot(p - a) / n.length();
+    // Only above the face, and nearer to its plane than to the edges, is there more to gain.
+    if height * height < best.0 {
+        let at = nearest_point(*t, p);
+        if at.distance_squared(p) < best.0 {
+            return at;
+        }
+    }
+    best.1
 }
 
 #[cfg(test)]
