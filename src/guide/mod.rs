@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`start`] | build the program, mesh a surface of your own, check the result, repair a surface |
 //! | [`sizes`] | say how long edges should be: everywhere, in places, by a formula or a file |
+//! | [`repair`] | wrap what has no inside |
 //! | [`regions`] | choose which volumes are filled |
 //! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |
 //! | [`cluster`] | share a mesh among the machines of a cluster |
@@ -23,6 +24,7 @@ macro_rules! links {
             "[start]: crate::guide::start\n",
             "[sizes]: crate::guide::sizes\n",
             "[regions]: crate::guide::regions\n",
+            "[repair]: crate::guide::repair\n",
             "[subdomains]: crate::guide::subdomains\n",
             "[cluster]: crate::guide::cluster\n",
             "[questions]: crate::guide::questions\n",
@@ -69,6 +71,10 @@ pub mod cluster {
 pub mod questions {
     #![doc = links!()]
     #![doc = include_str!("questions.md")]
+}
+pub mod repair {
+    #![doc = links!()]
+    #![doc = include_str!("repair.md")]
 }
 pub mod resaturation {
     #![doc = links!()]

@@ -159,6 +159,7 @@ chapters! {
     start: 10,
     sizes: 8,
     regions: 3,
+    repair: 4,
     subdomains: 5,
     cluster: 8,
     questions: 8,
