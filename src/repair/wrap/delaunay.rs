@@ -255,7 +255,7 @@ mod tests {
         for &p in &points {
             let hint = mesh.tet_at[mesh.points.len() - 1];
             assert!(mesh.insert(p, hint, 1e-3));
-            assert!(!mesh.insert(p, hint.min(0), 1e-3));
+            assert!(!mesh.insert(p, mesh.tet_at[mesh.points.len() - 1], 1e-3));
         }
         for t in (0..mesh.tets.len() as u32).filter(|&t| mesh.is_live(t)) {
             let [a, b, c, d] = mesh.corners(t);

@@ -16,10 +16,10 @@ use std::collections::BinaryHeap;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Lease, ScratchSpace, check_cancelled};
 
-use super::WrapError;
 use super::apart::Cell;
 use super::delaunay::{Delaunay, N_FAR, NONE, Tet, circumcircle, circumsphere};
 use super::oracle::{Nearest, Oracle};
+use super::settings::WrapError;
 
 /// Vertices are sought at this share of the offset, within the tolerance: rounding never brings them beyond the offset.
 const LEVEL: f64 = 0.999;
@@ -200,6 +200,9 @@ impl<'a> Flood<'a> {
     /// The first point on the way from the center of an outside cell to `to` that is on the offset.
     fn on_segment(&self, outside: u32, to: Point, distance: f64) -> Option<Point> {
         let from = circumsphere(self.mesh.corners(outside)).0;
+        if !from.is_finite() {
+            return None;
+        }
         let beyond = (distance - self.level).abs();
         if beyond <= self.tolerance {
             return Some(to);
@@ -210,8 +213,7 @@ impl<'a> Flood<'a> {
         let mut at = (self.reach[outside as usize] - self.level).abs();
         let mut within = FARTHER * self.reach[outside as usize] + at;
         for _ in 0..STEPS_MAX {
-            // Also where a center is not a number.
-            if !(at < end) {
+            if at >= end {
                 return None;
             }
             let p = from + direction * at;

@@ -130,7 +130,7 @@ fn boxes_through_each_other_become_one_shell_and_boxes_apart_two() {
 #[test]
 fn hemispheres_needles_planes_and_single_triangles_are_wrapped() {
     let sphere = |u: u32, v: u32| {
-        let (a, b) = (f64::from(u) * 0.3927, f64::from(v) * 0.3927);
+        let [a, b] = [u, v].map(|k| f64::from(k) * std::f64::consts::FRAC_PI_8);
         Point::new(a.cos() * b.cos(), a.sin() * b.cos(), b.sin())
     };
     let cap = (0..16).flat_map(|u| (0..4).map(move |v| (u, v))).flat_map(|(u, v)| {
