@@ -27,7 +27,7 @@ const HOUSE: &[(&str, &[&[&str]])] = &[
             &["bisect"],
         ],
     ),
-    ("repair", &[&["resolve", "remesh"], &["close"]]),
+    ("repair", &[&["resolve", "remesh", "wrap"], &["close"]]),
     ("store", &[&["sealed"], &["store"], &["query", "audit"]]),
     ("io", &[&["read", "write"]]),
     ("engine", &[&["pipeline"], &["view"], &["api"]]),

@@ -33,6 +33,8 @@ pub enum Origin {
     /// Near points were joined, and what needs no guess was repaired; what was done, in words that begin with the share of the box
     /// diagonal. The fingerprint is that of the repaired surface.
     Welded(String),
+    /// A closed surface around the triangles took their place; gap and offset. The fingerprint is that of the wrap.
+    Wrapped(String),
     /// All parts that are not closed are sheets.
     OpenParts,
     /// Embedded edges.
@@ -61,6 +63,7 @@ const SHEETS_FROM: &str = "sheets-from:";
 const RESOLVED: &str = "resolved:";
 const CLOSED: &str = "closed:";
 const WELDED: &str = "welded:";
+const WRAPPED: &str = "wrapped:";
 const OPEN_PARTS: &str = "open-parts:";
 const EDGES: &str = "edges:";
 const POINTS: &str = "points:";
@@ -90,6 +93,8 @@ impl Source {
             Origin::Closed(rest.to_owned())
         } else if let Some(rest) = after(WELDED) {
             Origin::Welded(rest.to_owned())
+        } else if let Some(rest) = after(WRAPPED) {
+            Origin::Wrapped(rest.to_owned())
         } else if let Some(rest) = after(SHEETS_FROM) {
             Origin::SheetsFrom(rest.parse().ok()?)
         } else if let Some(rest) = after(SHEET) {
@@ -120,6 +125,7 @@ impl Source {
             Origin::Resolved(what) => format!("{RESOLVED}{what}"),
             Origin::Closed(what) => format!("{CLOSED}{what}"),
             Origin::Welded(what) => format!("{WELDED}{what}"),
+            Origin::Wrapped(what) => format!("{WRAPPED}{what}"),
             Origin::OpenParts => OPEN_PARTS.to_owned(),
             Origin::Edges(file) => named(EDGES, file),
             Origin::Points(file) => named(POINTS, file),
@@ -143,7 +149,7 @@ impl Origin {
 
     /// Returns whether it is a repair of the parts before it.
     pub fn is_repair(&self) -> bool {
-        matches!(self, Self::Resolved(_) | Self::Closed(_) | Self::Welded(_))
+        matches!(self, Self::Resolved(_) | Self::Closed(_) | Self::Welded(_) | Self::Wrapped(_))
     }
 
     /// Returns whether the part is inside the surface, and was added after its own triangles.
@@ -169,6 +175,7 @@ mod tests {
             "resolved:56 pairs",
             "closed:holes=2,area=3e-1",
             "welded:share=1e-6,joined=4",
+            "wrapped:gap=1e-2,offset=1e-3",
             "edges:well=/home/a/wells.obj",
             "points:sensor=/home/a/p.csv",
             "wires:12,3",

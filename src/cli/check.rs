@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::args::CheckArgs;
+use super::args::{CheckArgs, RepairArgs};
 use super::check_report::Printed;
 use super::config;
 use super::console::Console;
@@ -32,8 +32,14 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // A check writes no temporary files next to its input.
     let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
     let options = typed(config::inside_of(&args.inside))?;
-    let mut surface =
-        input::load_with(&args.surfaces, None, &args.sheets, &options, &settings, console)?;
+    let mut surface = input::load_with(
+        &args.surfaces,
+        &RepairArgs::default(),
+        &args.sheets,
+        &options,
+        &settings,
+        console,
+    )?;
     if args.repair.is_none() {
         surface = surface.inside_settled(options.embed_outside, &settings)?;
     }
@@ -61,6 +67,7 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
             match step {
                 RepairStep::Resolve(done) => answer["resolve"] = json!(done),
                 RepairStep::Winding(done) => answer["winding"] = json!(done),
+                RepairStep::Wrap(done) => answer["wrap"] = json!(done),
                 RepairStep::Weld(done) => answer["repair"] = json!(done),
                 _ => {}
             }

@@ -73,6 +73,7 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         (_, Some(("resolved", what))) => format!("crossings resolved ({what})"),
         (_, Some(("closed", what))) => format!("closed by winding numbers ({what})"),
         (_, Some(("welded", what))) => format!("near points joined ({what})"),
+        (_, Some(("wrapped", what))) => format!("wrapped ({what})"),
         (path, _) => path.to_owned(),
     });
     let surfaces: Vec<String> = surfaces.collect();

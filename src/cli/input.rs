@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use super::args::SheetArgs;
+use super::args::{RepairArgs, SheetArgs, WrapLengths};
 use super::console::Console;
 use super::failure::Failure;
 use super::words::count;
+use super::wrap;
 use tetdb_engine::api::{
     Code, EmbeddedKind, MeshOptions, RepairKind, RepairStep, ResolveReport, Settings, Surface,
-    SurfaceWritten,
+    SurfaceWrap, SurfaceWritten,
 };
 
 /// The same settings, with temporary files in the folder of `file` or its nearest existing parent.
@@ -42,6 +43,7 @@ pub fn note_repaired(steps: &[RepairStep], console: &Console) {
             RepairStep::Winding(done) => {
                 console.note(&format!("note: closed: {}", done.in_words()));
             }
+            RepairStep::Wrap(_) => console.note(&format!("note: wrapped: {}", step.in_words())),
             other => console.note(&format!("note: repaired: {}", other.in_words())),
         }
     }
@@ -58,12 +60,24 @@ fn note_resolved(done: &ResolveReport, console: &Console) {
     }
 }
 
+/// The lengths of the wrap that a mesh begins with, if it does.
+fn wrap_lengths(repair: &RepairArgs) -> Result<Option<SurfaceWrap>, Failure> {
+    let [gap, offset] = [&repair.wrap_gap, &repair.wrap_offset].map(Clone::clone);
+    let is_wrap = matches!(repair.repair, Some(RepairKind::Wrap));
+    if !is_wrap && (gap.is_some() || offset.is_some()) {
+        let message = "--wrap-gap and --wrap-offset belong to --repair wrap";
+        return Err(Failure::new(Code::Usage, message).help("leave them out, or wrap the surface"));
+    }
+    let lengths = wrap::lengths(&WrapLengths { gap, offset })?;
+    Ok(is_wrap.then_some(lengths))
+}
+
 /// Reads files or generates a sample, and embeds sheets, edges and points.
 ///
 /// As `options` say, triangles are divided where edges and points lie on them, and points are moved there.
 pub fn load_with(
     arguments: &[String],
-    repair: Option<RepairKind>,
+    repair: &RepairArgs,
     sheets: &SheetArgs,
     options: &MeshOptions,
     settings: &Settings,
@@ -79,10 +93,17 @@ pub fn load_with(
         }
         names.push((file, name));
     }
+    let lengths = wrap_lengths(repair)?;
     let mut surface = Surface::load(arguments, settings)?;
-    if let Some(kind) = repair {
+    if let Some(kind) = repair.repair {
         let steps;
-        (surface, steps) = surface.repaired_by(kind, settings)?;
+        (surface, steps) = match lengths {
+            Some(lengths) => {
+                let (wrap, done) = surface.wrapped_with(&lengths, settings)?;
+                (wrap, vec![RepairStep::Wrap(done)])
+            }
+            None => surface.repaired_by(kind, settings)?,
+        };
         note_repaired(&steps, console);
     }
     if sheets.allow_open {

@@ -37,6 +37,7 @@ mod tasks;
 mod threads;
 mod verify;
 mod words;
+mod wrap;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -204,6 +205,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Export(args) => export::run(args, console),
         Command::RefineSurface(args) => refine_surface::run(args, console),
         Command::RemeshSurface(args) => remesh_surface::run(args, console),
+        Command::Wrap(args) => wrap::run(args, console),
         Command::Snapshot(args) => snapshot::run(args, console),
         Command::Report(args) => report::run(args, console),
         Command::Sample(args) => sample::run(args, console),

@@ -16,6 +16,7 @@ pub fn names(command: &Command) -> Vec<(&'static str, String)> {
         Command::RemeshSurface(a) => {
             (None, plain(std::slice::from_ref(&a.surface), &SheetArgs::default()))
         }
+        Command::Wrap(a) => (None, plain(&a.surfaces, &SheetArgs::default())),
         Command::Resume(a) => (Some(a.store.clone()), None),
         Command::Plan(a) => (Some(a.store.clone()), None),
         Command::Work(a) => (Some(a.store.clone()), None),

@@ -21,6 +21,7 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     let Some(h) = sizes.hsiz else {
         unreachable!("it was given");
     };
+    Surface::check_format(&args.output)?;
     if !args.force {
         check_target(&args.output, &[PathBuf::from(&args.surface)])
             .map_err(|e| Failure::from(e).or_force(&args.output))?;

@@ -27,6 +27,7 @@ pub fn run(args: &RemeshSurfaceArgs, console: &Console) -> Result<u8, Failure> {
         hmin: sizes.hmin,
         hgrad: sizes.hgrad,
     };
+    Surface::check_format(&args.output)?;
     if !args.force {
         check_target(&args.output, &[PathBuf::from(&args.surface)])
             .map_err(|e| Failure::from(e).or_force(&args.output))?;

@@ -26,14 +26,17 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
         true => store.verify(level)?,
         false => {
             let options = MeshOptions::default();
-            let surface = input::load_with(
+            let mut surface = input::load_with(
                 &args.against,
-                args.repair.repair,
+                &args.repair,
                 &args.sheets,
                 &options,
                 &settings,
                 console,
             )?;
+            if !embeds {
+                surface = store.repaired_alike(surface)?;
+            }
             store.verify_against(&surface, level)?
         }
     };

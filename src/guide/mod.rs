@@ -3,7 +3,7 @@
 //! | chapter | what you learn |
 //! |---|---|
 //! | [`start`] | build the program, mesh a surface of your own, check the result |
-//! | [`repair`] | mesh surfaces with cracks, holes and crossings |
+//! | [`repair`] | mesh surfaces with cracks, holes and crossings, and soups |
 //! | [`sizes`] | say how long edges should be: everywhere, in places, by a formula or a file |
 //! | [`regions`] | choose which volumes are filled |
 //! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |

@@ -30,6 +30,7 @@ fn what_check_prints_for_a_hole_gives_the_mesh() {
     assert!((volume(&place, "a.tetdb") - 1.0).abs() < 1e-12);
     for line in [
         "verify a.tetdb --full",
+        "verify a.tetdb --against open.off",
         "verify a.tetdb --against open.off --repair winding",
         "verify a.tetdb --against open.off --repair auto",
         "estimate open.off --repair winding",

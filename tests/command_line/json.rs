@@ -14,7 +14,7 @@ const PAGE: &str = include_str!("../../src/guide/scripting.md");
 const FREE: [&str; 4] = ["options", "subdomains[].sizes.options", "findings", "measures.chunks"];
 
 /// The commands of each section, in order. The surfaces are written first.
-const RUNS: [(&str, &[&str]); 17] = [
+const RUNS: [(&str, &[&str]); 18] = [
     ("sample", &["sample box,h=0.045 -o box.stl", "sample sphere,h=0.2 -o sphere.stl"]),
     (
         "check",
@@ -51,6 +51,7 @@ const RUNS: [(&str, &[&str]); 17] = [
     ("export", &["export a.tetdb a.vtu a.npy", "export a.tetdb a.json"]),
     ("refine-surface", &["refine-surface sphere.stl fine.stl --hsiz 0.1"]),
     ("remesh-surface", &["remesh-surface sphere.stl even.stl --tolerance 1%"]),
+    ("wrap", &["wrap sphere.stl -o wrap.stl --gap 10%"]),
     (
         "query",
         &[

@@ -38,4 +38,5 @@ mod tasks;
 mod together;
 mod walls;
 mod wires;
+mod wrap;
 mod zone;

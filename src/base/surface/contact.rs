@@ -86,6 +86,26 @@ pub fn contact(p: [Point; 3], p_ids: [u32; 3], q: [Point; 3], q_ids: [u32; 3]) -
     }
 }
 
+/// Returns whether the closed triangle `t` and the closed triangle, edge or point `s` share a point.
+///
+/// `t` must have area; the corners of `s` may be equal or in line. The answer is exact.
+pub fn meets(t: &[Point; 3], s: &[Point; 3]) -> bool {
+    let sides = s.map(|x| side(t, x));
+    if one_side(sides) {
+        return false;
+    }
+    let meets = |[a, b]: [Point; 2], [x, y]: [i8; 2], of| edge_meets(a, b, x, y, of).is_some();
+    let ring = [[0, 1], [1, 2], [2, 0]];
+    if ring.iter().any(|&[k, l]| meets([s[k], s[l]], [sides[k], sides[l]], t)) {
+        return true;
+    }
+    if Projection::new(s).turn(s[0], s[1], s[2]) == 0 {
+        return false;
+    }
+    let sides = t.map(|x| side(s, x));
+    ring.iter().any(|&[k, l]| meets([t[k], t[l]], [sides[k], sides[l]], s))
+}
+
 /// The side of the plane of `t` on which `x` lies: 1, 0 or −1.
 #[inline]
 pub(super) fn side(t: &[Point; 3], x: Point) -> i8 {

@@ -49,7 +49,7 @@ mod tests;
 pub use boundary_loops::{BoundaryLoop, TJunction, boundary_loops, t_junctions};
 pub use boxes::BoxTree;
 pub use cells::CellBoundary;
-pub use contact::{Contact, ContactKind, contact};
+pub use contact::{Contact, ContactKind, contact, meets};
 pub use defect::{Defect, SurfaceError};
 pub use defect::{show, triangle_name};
 pub use divide::Divided;

@@ -21,7 +21,8 @@ pub use shape::{InsideArgs, ShapeArgs, SizeArgs};
 pub use show::{CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
 pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
 pub use surface::{
-    CheckArgs, RefineSurfaceArgs, RemeshSurfaceArgs, RepairArgs, SampleArgs, SheetArgs,
+    CheckArgs, RefineSurfaceArgs, RemeshSurfaceArgs, RepairArgs, SampleArgs, SheetArgs, WrapArgs,
+    WrapLengths,
 };
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 
@@ -110,6 +111,11 @@ pub enum Command {
     /// Needles vanish. Edges between faces, borders of labels and corners are kept; no point of either surface is farther than the
     /// tolerance from the other.
     RemeshSurface(RemeshSurfaceArgs),
+    /// Write a closed surface around anything: soups, open surfaces, parts that cross
+    ///
+    /// The surface encloses all triangles, and its vertices are at most the offset away. Openings narrower than about twice the gap are
+    /// closed, and what only they lead to is filled.
+    Wrap(WrapArgs),
     /// Draw a cut through the mesh, or its surfaces in space
     ///
     /// A cut is seen from the side its direction points to. Only what is seen is read.
@@ -147,6 +153,7 @@ impl Command {
             Self::Export(a) => a.read.json,
             Self::RefineSurface(a) => a.json,
             Self::RemeshSurface(a) => a.json,
+            Self::Wrap(a) => a.json,
             Self::Snapshot(a) => a.read.json,
             Self::Report(a) => a.read.json,
             Self::Sample(a) => a.json,

@@ -36,13 +36,19 @@ impl SheetArgs {
 }
 
 /// A repair before anything else.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 pub struct RepairArgs {
     /// Repair the surface first: resolve divides triangles that cross along their intersections, and the others stay as they are; winding
-    /// then closes holes, turns shells outward and unites what overlaps; auto takes the first of joining near points, resolve and winding
-    /// that leaves no defect
+    /// then closes holes, turns shells outward and unites what overlaps; wrap puts a closed surface around all, as `tetdb wrap` does; auto
+    /// takes the first of joining near points, resolve, winding and wrap that leaves no defect
     #[arg(long, value_name = "HOW", value_parser = word_of::<RepairKind>(&[]))]
     pub repair: Option<RepairKind>,
+    /// With --repair wrap: openings narrower than about twice this are closed [default: 1%]
+    #[arg(long, value_name = "DIST", allow_hyphen_values = true, requires = "repair")]
+    pub wrap_gap: Option<String>,
+    /// With --repair wrap: greatest distance of its vertices from the surface [default: 0.1%]
+    #[arg(long, value_name = "DIST", allow_hyphen_values = true, requires = "repair")]
+    pub wrap_offset: Option<String>,
 }
 
 /// What is wrong with a surface, and what mesh it allows. Nothing is changed unless --repair is given.
@@ -64,8 +70,8 @@ pub struct CheckArgs {
     #[arg(long, value_name = "FILE")]
     pub write_bad: Option<PathBuf>,
     /// Drop triangles without area and repeated ones, divide triangles at T-junctions, turn triangles so that neighbors face the same side;
-    /// --repair=resolve instead divides triangles that cross along their intersections, --repair=winding closes holes, --repair=auto takes
-    /// what is needed
+    /// --repair=resolve instead divides triangles that cross along their intersections, --repair=winding closes holes, --repair=wrap puts a
+    /// closed surface around all, --repair=auto takes what is needed
     #[arg(long, requires = "write", value_name = "HOW", num_args = 0..=1, require_equals = true, value_parser = word_of::<RepairKind>(&[]))]
     pub repair: Option<Option<RepairKind>>,
     /// With --repair: first join points not farther apart than this share of the box diagonal
@@ -154,6 +160,46 @@ pub struct RemeshSurfaceArgs {
     /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The lengths of a wrap.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct WrapLengths {
+    /// Openings narrower than about twice this are closed, and triangles have about this size: a length, or a share of the box diagonal [default: 1%]
+    #[arg(long, value_name = "DIST", allow_hyphen_values = true)]
+    pub gap: Option<String>,
+    /// Greatest distance of the vertices from the surface: a length, or a share of the box diagonal [default: 0.1%]
+    #[arg(long, value_name = "DIST", allow_hyphen_values = true)]
+    pub offset: Option<String>,
+}
+
+/// A closed surface around anything.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb wrap scan.ply -o closed.obj\n  tetdb wrap housing.stl lid.stl -o both.stl --gap 2% --offset 0.2%\n  tetdb mesh closed.obj -o part.tetdb\n\n\
+    Smaller gaps enter narrower openings and give more triangles: half the gap, about four times as many."
+)]
+pub struct WrapArgs {
+    /// Surface files, or a sample
+    #[arg(required = true, value_name = "IN")]
+    pub surfaces: Vec<String>,
+    /// The file to write: .stl (text), .off, .obj or .ply, all exact
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub lengths: WrapLengths,
+    /// Write even over a surface that is read
+    #[arg(long)]
+    pub force: bool,
+    /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Number of threads [default: all cores]; the wrap is the same for any number
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub threads: Option<usize>,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,

@@ -66,6 +66,7 @@ mod surface_repair;
 mod surface_report;
 mod surface_resolve;
 mod surface_wires;
+mod surface_wrap;
 #[doc(hidden)]
 pub mod targets;
 mod tasks;
@@ -115,6 +116,9 @@ pub use surface_remesh::SurfaceRemesh;
 pub use surface_repair::{RepairReport, WELD_SHARE_MAX};
 pub use surface_report::SurfaceReport;
 pub use surface_resolve::ResolveReport;
+pub use surface_wrap::SurfaceWrap;
+#[doc(hidden)]
+pub use surface_wrap::wrap_in_words;
 pub use targets::{check_target, inputs_of};
 pub use tasks::Tasks;
 pub use tasks_status::{GatherReport, TaskReport, TaskStage, TaskStatus, task_ranges};
@@ -131,6 +135,7 @@ pub use tetdb_kernel::samples::PREFIX as SAMPLE_PREFIX;
 pub use tetdb_kernel::sizing::SizeWarning;
 pub use tetdb_repair::close::ClosedHole;
 pub use tetdb_repair::remesh::RemeshReport as SurfaceRemeshReport;
+pub use tetdb_repair::wrap::WrapReport;
 pub use tetdb_schema::catalog::{QualityRow, StoreState};
 pub use tetdb_schema::code::Code;
 pub use tetdb_schema::labels::LabelSet;

@@ -8,6 +8,7 @@ use super::{Error, Event, Settings, Surface, Verification, VerifyLevel, job, ver
 use tetdb_base::storage::RunContext;
 use tetdb_schema::catalog::{InterfaceRow, RegionRow, StoreState, SubdomainRow};
 use tetdb_schema::labels::LabelSet;
+use tetdb_schema::source::Source;
 use tetdb_store::audit::Level;
 use tetdb_store::query::QuerySession;
 use tetdb_store::sealed::Subdomain;
@@ -160,6 +161,21 @@ impl Store {
             };
             drop(scratch);
             self.verify_with(surface.as_ref(), level)
+        })
+    }
+
+    /// Repairs a surface as that of the store was repaired, if it was.
+    ///
+    /// Errors: those of the repairs.
+    pub fn repaired_alike(&self, mut surface: Surface) -> Result<Surface, Error> {
+        guarded_in(&self.context, || {
+            let records = self.catalog.share().job()?.surfaces;
+            let sources = records.iter().filter_map(Source::from_record);
+            let scratch = self.settings.scratch_space(surface.inner.bytes() as u64)?;
+            for source in sources.filter(|s| s.origin.is_repair()) {
+                surface = surface.with_inside(&source.origin, &self.path, &scratch)?;
+            }
+            Ok(surface)
         })
     }
 

@@ -335,6 +335,13 @@ impl Surface {
         })
     }
 
+    /// Checks that [`Surface::write`] knows the format of a file of that name.
+    ///
+    /// Errors: `unknown-format`.
+    pub fn check_format(out: impl AsRef<Path>) -> Result<(), Error> {
+        Ok(write::check_surface_format(out.as_ref())?)
+    }
+
     /// Reads files, or generates one sample, within the memory of `scratch`.
     pub(super) fn load_within(words: &[String], scratch: &ScratchSpace) -> Result<Self, Error> {
         let samples = words.iter().filter(|word| word.starts_with(PREFIX)).count();
@@ -425,7 +432,7 @@ impl Surface {
     }
 
     /// Embeds a recorded sheet, or recorded edges or points.
-    fn with_inside(
+    pub(super) fn with_inside(
         mut self,
         origin: &Origin,
         store: &Path,
@@ -455,6 +462,7 @@ impl Surface {
             Origin::Resolved(_) | Origin::Closed(_) | Origin::Welded(_) => {
                 self.repaired_again(origin, scratch)
             }
+            Origin::Wrapped(text) => self.wrapped_again(text, scratch),
             Origin::OpenParts | Origin::File(_) | Origin::Sample(_) | Origin::Copy => {
                 Ok(self.open_parts_in(scratch)?.0)
             }

@@ -9,11 +9,14 @@ use super::error::Error;
 use super::surface::{given, refuse_sheets};
 use super::surface_repair::within;
 use super::surface_resolve::report as resolve_report;
-use super::{CloseReport, RepairReport, ResolveReport, Settings, Surface, guarded};
+use super::surface_wrap::wrap_in_words;
+use super::{
+    CloseReport, RepairReport, ResolveReport, Settings, Surface, SurfaceWrap, WrapReport, guarded,
+};
 use tetdb_base::geom::{counted, short};
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface::{closing, repair, validate_with};
-use tetdb_repair::close::{Watcher, close_bytes};
+use tetdb_repair::close::{CloseError, Watcher, close_bytes};
 use tetdb_schema::source::Source;
 
 /// Points farther apart than this share of the box diagonal are not joined unless that is asked for. Coordinates of 32 bits are up to
@@ -28,13 +31,19 @@ pub enum RepairKind {
     Resolve,
     /// Holes are closed, and overlapping parts united; see [`Surface::closed`].
     Winding,
-    /// The first of joining near points, `Resolve` and `Winding` that leaves no defect.
+    /// A closed surface around all triangles takes their place; see [`Surface::wrapped`].
+    Wrap,
+    /// The first of joining near points, `Resolve`, `Winding` and `Wrap` that leaves no defect. What goes around nothing is not wrapped.
     Auto,
 }
 
 impl Word for RepairKind {
-    const WORDS: &'static [(Self, &'static str)] =
-        &[(Self::Resolve, "resolve"), (Self::Winding, "winding"), (Self::Auto, "auto")];
+    const WORDS: &'static [(Self, &'static str)] = &[
+        (Self::Resolve, "resolve"),
+        (Self::Winding, "winding"),
+        (Self::Wrap, "wrap"),
+        (Self::Auto, "auto"),
+    ];
 }
 
 /// A repair that was done. Serialized, it has one key with the name of the repair.
@@ -48,6 +57,8 @@ pub enum RepairStep {
     Resolve(ResolveReport),
     /// Holes were closed.
     Winding(CloseReport),
+    /// A closed surface was put around all.
+    Wrap(WrapReport),
 }
 
 impl RepairStep {
@@ -83,6 +94,7 @@ impl RepairStep {
             }
             Self::Resolve(report) => report.in_words(),
             Self::Winding(report) => report.in_words(),
+            Self::Wrap(report) => wrap_in_words(report),
         }
     }
 }
@@ -92,7 +104,7 @@ impl Surface {
     /// [`RepairKind::Auto`] finds without defects.
     ///
     /// # Errors
-    /// Those of [`Surface::resolve_reported`] and [`Surface::closed_reported`].
+    /// Those of [`Surface::resolve_reported`], [`Surface::closed_reported`] and [`Surface::wrapped`].
     pub fn repaired_by(
         self,
         kind: RepairKind,
@@ -107,6 +119,10 @@ impl Surface {
                 let (surface, report) = self.closed_reported(settings)?;
                 Ok((surface, vec![RepairStep::Winding(report)]))
             }
+            RepairKind::Wrap => {
+                let (surface, report) = self.wrapped_with(&SurfaceWrap::default(), settings)?;
+                Ok((surface, vec![RepairStep::Wrap(report)]))
+            }
             RepairKind::Auto => {
                 refuse_sheets(&self.inner, "repaired")?;
                 guarded(settings, || {
@@ -117,7 +133,7 @@ impl Surface {
         }
     }
 
-    /// The cheapest repair that leaves no defect: nothing, joining near points, resolving, closing.
+    /// The cheapest repair that leaves no defect: nothing, joining near points, resolving, closing, wrapping.
     fn auto_in(
         mut self,
         scratch: &ScratchSpace,
@@ -158,10 +174,21 @@ impl Surface {
                 return Ok((self, steps));
             }
         }
-        // What winding numbers cannot close is for a wrap, which would follow here.
-        let (closed, report) = self.closed_in(scratch, watch)?;
-        steps.push(RepairStep::Winding(report));
-        Ok((closed, steps))
+        match self.clone().try_closed_in(scratch, watch)? {
+            Ok((closed, report)) => {
+                steps.push(RepairStep::Winding(report));
+                Ok((closed, steps))
+            }
+            // A wrap of it would be a solid that nobody meant.
+            Err(e @ CloseError::NothingInside) => Err(e.into()),
+            Err(_) => {
+                let wanted = SurfaceWrap::default().settings(&self.inner);
+                let told = |share: f64| watch("wrap", (share * 1000.0) as u64, 1000);
+                let (wrap, report) = self.wrapped_in(&wanted, scratch, &told)?;
+                steps.push(RepairStep::Wrap(report));
+                Ok((wrap, steps))
+            }
+        }
     }
 
     /// Joins points nearer than this share of the diagonal, and puts that on record.

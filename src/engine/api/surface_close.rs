@@ -133,11 +133,23 @@ impl Surface {
 
     /// Closes holes, and puts that on record.
     pub(super) fn closed_in(
-        mut self,
+        self,
         scratch: &ScratchSpace,
         watch: &Watcher,
     ) -> Result<(Self, CloseReport), Error> {
-        let report = CloseReport::new(attempt(|| close(&mut self.inner, scratch, watch))??);
+        Ok(self.try_closed_in(scratch, watch)??)
+    }
+
+    /// [`Surface::closed_in`], with what may be answered by another repair as an inner error.
+    pub(super) fn try_closed_in(
+        mut self,
+        scratch: &ScratchSpace,
+        watch: &Watcher,
+    ) -> Result<Result<(Self, CloseReport), CloseError>, Error> {
+        let report = match attempt(|| close(&mut self.inner, scratch, watch))? {
+            Ok(done) => CloseReport::new(done),
+            Err(e) => return Ok(Err(e)),
+        };
         let CloseReport { hole_area, turned, dropped_inside, dropped_outside, volume, .. } = report;
         let text = format!(
             "holes={},area={hole_area:e},added={},turned={turned},dropped-inside={dropped_inside},dropped-outside={dropped_outside},volume={volume:e},moved={:e}",
@@ -146,7 +158,7 @@ impl Surface {
             report.resolve.moved_most
         );
         self.record(Origin::Closed(text));
-        Ok((self, report))
+        Ok(Ok((self, report)))
     }
 }
 

@@ -66,7 +66,7 @@ pub use npy::{NpyField, NpyTable};
 pub use report::ExportReport;
 use report::FileCounts;
 pub use selection::{Content, ElementOrder, ExportSelection, Share};
-pub use surface::{SurfaceWritten, surface, wires};
+pub use surface::{SurfaceWritten, check_surface_format, surface, wires};
 pub use vtk::{SelectedTet, SelectedVtu, defects};
 
 use merged::{Merged, ReadProgress};

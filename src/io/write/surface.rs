@@ -24,23 +24,10 @@ pub struct SurfaceWritten {
 /// `.stl` is text, because binary STL has single precision; `.stlb` is binary when nothing is rounded.
 /// `.ply` is binary with doubles. Errors: [`WriteError`]; `out` is not touched then.
 pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceWritten> {
-    let extension = out.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let (write, labels): (Write, bool) = match extension.to_ascii_lowercase().as_str() {
-        "stl" | "stla" => (stl, true),
-        "stlb" => {
-            refuse_rounding(surface, out)?;
-            (stl_binary, false)
-        }
-        "off" => (off, false),
-        "obj" => (obj, true),
-        "ply" => (ply, true),
-        _ => {
-            return Err(WriteError::UnknownFormat {
-                path: out.to_owned(),
-                known: ".stl, .off, .obj or .ply",
-            });
-        }
-    };
+    let (write, labels, is_double) = writer_of(out)?;
+    if !is_double {
+        refuse_rounding(surface, out)?;
+    }
     let mut outputs = OutputFiles::new(out)?;
     let path = outputs.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
@@ -50,6 +37,29 @@ pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceWritten> {
     Ok(SurfaceWritten {
         bytes: files.iter().map(|f| f.1).sum(),
         labels_kept: labels || surface.label_names.len() <= 1,
+    })
+}
+
+/// Checks that a surface can be written to a file of that name. Errors: [`WriteError::UnknownFormat`].
+pub fn check_surface_format(out: &Path) -> Result<()> {
+    writer_of(out).map(|_| ())
+}
+
+/// The writer for a name, whether it keeps labels, and whether it keeps doubles.
+fn writer_of(out: &Path) -> Result<(Write, bool, bool)> {
+    let extension = out.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    Ok(match extension.to_ascii_lowercase().as_str() {
+        "stl" | "stla" => (stl, true, true),
+        "stlb" => (stl_binary, false, false),
+        "off" => (off, false, true),
+        "obj" => (obj, true, true),
+        "ply" => (ply, true, true),
+        _ => {
+            return Err(WriteError::UnknownFormat {
+                path: out.to_owned(),
+                known: ".stl, .off, .obj or .ply",
+            });
+        }
     })
 }
 
