@@ -52,20 +52,14 @@ use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Pages, StorageError};
 
 /// Variants of the method, for comparisons; the default is the method.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Method {
     /// Lengths of edges: from the field or from the ends.
     pub lengths: Lengths,
     /// Choice of the cutting plane.
     pub plane: PlaneChoice,
-    /// True to saturate in blocks where lengths come from the field.
+    /// True to saturate in blocks where lengths come from the field. Not finished.
     pub in_blocks: bool,
-}
-
-impl Default for Method {
-    fn default() -> Self {
-        Self { lengths: Lengths::default(), plane: PlaneChoice::default(), in_blocks: false }
-    }
 }
 
 impl Method {

@@ -2,8 +2,8 @@
 //!
 //! Edges are divided, collapsed and flipped, and vertices moved on the surface, until triangles are even and as large as curvature and
 //! thickness allow (Botsch and Kobbelt, "A remeshing approach to multiresolution modeling", 2004). Each change is refused that leaves
-//! the tolerance either way ([`envelope`]), folds the surface, lets triangles touch, or takes the last triangle of a label. Kept
-//! curves ([`chains`]) stay within the tolerance of their own input; corners stay where they are.
+//! the tolerance either way (`envelope`), folds the surface, lets triangles touch, or takes the last triangle of a label. Kept
+//! curves (`chains`) stay within the tolerance of their own input; corners stay where they are.
 //!
 //! Reading order: `settings`, `region` (convex sets around a triangle), `envelope` (the distance bound), `octree`, `mesh`, `chains`, `sizes` and
 //! `sources` (wanted lengths), `change` (one replacement and its checks), `operations`, `passes`.
