@@ -174,9 +174,8 @@ impl From<CloseError> for Error {
         match e {
             CloseError::Resolve(e) => e.into(),
             CloseError::Boundary(e) => e.into(),
-            CloseError::NothingInside => Self::new(Code::NothingFilled, &e).with_help(
-                "a surface that goes around nothing can be embedded in another as a sheet",
-            ),
+            CloseError::NothingInside => Self::new(Code::NothingFilled, &e)
+                .with_help("embed it in another surface as a sheet, or wrap it"),
             CloseError::Unsound { ref places, .. } => {
                 let at: Vec<String> = places.iter().take(4).map(|p| show(*p)).collect();
                 Self::new(Code::SelfIntersection, &e)
