@@ -11,7 +11,9 @@ use super::{ResolveReport, Settings, Surface, guarded};
 use tetdb_base::geom::{counted, short};
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface::{self, show};
-use tetdb_repair::close::{CloseError, Closed, ClosedHole, Watcher, close, close_bytes};
+use tetdb_repair::close::{
+    CloseError, Closed, ClosedHole, Watcher, close, close_bytes, is_promising,
+};
 
 /// Holes listed in words.
 const LISTED: usize = 3;
@@ -162,8 +164,11 @@ impl Surface {
     }
 }
 
-/// Tries to close a copy of a surface; `None` where that fails.
+/// Tries to close a copy of a surface; `None` where that fails, or some triangles tell that it would.
 pub(super) fn tried(surface: &surface::Surface, scratch: &ScratchSpace) -> Option<CloseReport> {
+    if !is_promising(surface) {
+        return None;
+    }
     let mut copy = surface.clone();
     let done = attempt(|| close(&mut copy, scratch, &|_, _, _| {})).ok()?.ok()?;
     Some(CloseReport::new(done))

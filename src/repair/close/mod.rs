@@ -103,6 +103,15 @@ pub fn close_bytes(surface: &Surface) -> u64 {
     repair_bytes(surface) + VERTEX * surface.n_vertices() as u64
 }
 
+/// Whether [`close`] is worth trying, told from some triangles in a moment: the coarse mesh of a sheet with thousands of corners on one
+/// circle takes long, and nothing would come of it.
+pub fn is_promising(surface: &Surface) -> bool {
+    WindingTree::new(surface, |_| true).goes_around(PROMISING)
+}
+
+/// Triangles asked by [`is_promising`].
+const PROMISING: usize = 256;
+
 /// Makes a closed surface of one with open edges, doubled or turned shells, or parts that overlap.
 ///
 /// Inside is where the surface goes around more than half a time, either way. Triangles between inside and outside stay, turned
@@ -123,15 +132,18 @@ pub fn close(
     if surface.n_triangles() == 0 {
         return Err(CloseError::NothingInside);
     }
-    let mut mesh = coarse(surface, watch)?;
-    let mut sides = choose_sides(&mut mesh, &WindingTree::new(surface, |_| true), watch);
-    let two_sided = closedness(surface).two_sided;
-    if sides.volume == 0.0 && !two_sided.is_empty() {
+    let mut tree = WindingTree::new(surface, |_| true);
+    if !tree.goes_around(usize::MAX) {
         // Walls given from both sides go around nothing.
+        let two_sided = closedness(surface).two_sided;
         let seconds: BTreeSet<u32> = two_sided.into_iter().map(|[_, second]| second).collect();
-        let tree = WindingTree::new(surface, |t| !seconds.contains(&t));
-        sides = choose_sides(&mut mesh, &tree, watch);
+        tree = WindingTree::new(surface, |t| !seconds.contains(&t));
+        if seconds.is_empty() || !tree.goes_around(usize::MAX) {
+            return Err(CloseError::NothingInside);
+        }
     }
+    let mut mesh = coarse(surface, watch)?;
+    let sides = choose_sides(&mut mesh, &tree, watch);
     if sides.volume == 0.0 {
         return Err(CloseError::NothingInside);
     }
