@@ -9,7 +9,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::{input, memory, threads};
 use tetdb_engine::api::targets::check_target;
-use tetdb_engine::api::{Error, Length, Surface, SurfaceWrap, wrap_in_words};
+use tetdb_engine::api::{Error, Length, Surface, SurfaceWrap};
 
 /// The lengths of a wrap; those not given are the usual ones.
 pub fn lengths(args: &WrapLengths) -> Result<SurfaceWrap, Failure> {
@@ -46,6 +46,6 @@ pub fn run(args: &WrapArgs, console: &Console) -> Result<u8, Failure> {
         }));
         return Ok(0);
     }
-    console.note(&format!("wrote {}: {}", args.output.display(), wrap_in_words(&report)));
+    console.note(&format!("wrote {}: {}", args.output.display(), report.in_words()));
     Ok(0)
 }

@@ -15,4 +15,6 @@
 pub mod close;
 pub mod remesh;
 pub mod resolve;
+#[cfg(test)]
+mod tests;
 pub mod wrap;

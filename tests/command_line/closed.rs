@@ -6,14 +6,6 @@
 use super::odd_inputs::{cube_at, off};
 use super::place::Place;
 
-/// Sum of the volumes that are filled.
-fn volume(place: &Place, store: &str) -> f64 {
-    let info = place.run(&["info", store, "--json"]).succeeds().json();
-    let regions = info["regions"].as_array().expect("regions");
-    let filled = regions.iter().filter(|r| r["filled"] == true);
-    filled.map(|r| r["volume"].as_f64().expect("a number")).sum()
-}
-
 #[test]
 fn what_check_prints_for_a_hole_gives_the_mesh() {
     let place = Place::new();
@@ -27,7 +19,7 @@ fn what_check_prints_for_a_hole_gives_the_mesh() {
     let line = format!("{} -o a.tetdb --hsiz 0.5", command.trim_start_matches("tetdb "));
     let notes = place.run_line(&line).succeeds().stderr();
     assert!(notes.contains("1 hole was closed, with 2 triangles of area 1 "), "{notes}");
-    assert!((volume(&place, "a.tetdb") - 1.0).abs() < 1e-12);
+    assert!((place.volume("a.tetdb") - 1.0).abs() < 1e-12);
     for line in [
         "verify a.tetdb --full",
         "verify a.tetdb --against open.off",
@@ -78,7 +70,7 @@ fn what_came_from_no_file_is_kept_as_it_was_repaired() {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     place.run_line("resume a.tetdb").succeeds();
     place.run_line("verify a.tetdb --full").succeeds();
-    assert!((volume(&place, "a.tetdb") - 1.0).abs() < 1e-12);
+    assert!((place.volume("a.tetdb") - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -111,7 +103,7 @@ fn the_cheapest_repair_is_taken() {
         place
             .run_line(&format!("mesh {file} -o a.tetdb --force --hsiz 0.5 --repair auto"))
             .succeeds();
-        assert!((volume(&place, "a.tetdb") - wanted).abs() < 1e-5, "{file}");
+        assert!((place.volume("a.tetdb") - wanted).abs() < 1e-5, "{file}");
         place.run_line("verify a.tetdb").succeeds();
         place.run_line(&format!("verify a.tetdb --against {file} --repair auto")).succeeds();
     }

@@ -84,6 +84,14 @@ impl Place {
     }
 
     /// The digest of a store in the folder.
+    /// Sum of the volumes that are filled.
+    pub fn volume(&self, store: &str) -> f64 {
+        let info = self.run(&["info", store, "--json"]).succeeds().json();
+        let regions = info["regions"].as_array().expect("regions");
+        let filled = regions.iter().filter(|r| r["filled"] == true);
+        filled.map(|r| r["volume"].as_f64().expect("a number")).sum()
+    }
+
     pub fn digest(&self, store: &str) -> String {
         self.run(&["digest", store]).succeeds().stdout().trim().to_owned()
     }

@@ -6,14 +6,6 @@
 use super::odd_inputs::{cube_at, off};
 use super::place::Place;
 
-/// Sum of the volumes that are filled.
-fn volume(place: &Place, store: &str) -> f64 {
-    let info = place.run(&["info", store, "--json"]).succeeds().json();
-    let regions = info["regions"].as_array().expect("regions");
-    let filled = regions.iter().filter(|r| r["filled"] == true);
-    filled.map(|r| r["volume"].as_f64().expect("a number")).sum()
-}
-
 #[test]
 fn what_check_prints_for_crossings_gives_the_mesh_of_the_union() {
     let place = Place::new();
@@ -29,7 +21,7 @@ fn what_check_prints_for_crossings_gives_the_mesh_of_the_union() {
     let line = format!("{} -o two.tetdb --hsiz 0.5", command.trim_start_matches("tetdb "));
     let notes = place.run_line(&line).succeeds().stderr();
     assert!(notes.contains("triangles were divided"), "{notes}");
-    assert!((volume(&place, "two.tetdb") - (2.0 - 0.5 * 0.75 * 0.625)).abs() < 1e-12);
+    assert!((place.volume("two.tetdb") - (2.0 - 0.5 * 0.75 * 0.625)).abs() < 1e-12);
     // The store knows what was done: it verifies by itself, and against the same file repaired alike.
     for line in [
         "verify two.tetdb --full",
@@ -43,7 +35,7 @@ fn what_check_prints_for_crossings_gives_the_mesh_of_the_union() {
     assert!(info.contains("crossings resolved (pairs="), "{info}");
     // Parity takes the common part out.
     place.run_line("mesh two.off -o odd.tetdb --hsiz 0.5 --repair resolve").succeeds();
-    assert!(volume(&place, "odd.tetdb") < volume(&place, "two.tetdb") - 0.2);
+    assert!(place.volume("odd.tetdb") < place.volume("two.tetdb") - 0.2);
 }
 
 #[test]

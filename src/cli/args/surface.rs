@@ -1,4 +1,4 @@
-//! What can be typed behind `check`, `refine-surface`, `remesh-surface` and `sample`.
+//! Arguments of the commands on surfaces: `check`, `wrap`, `refine-surface`, `remesh-surface` and `sample`.
 
 use std::path::PathBuf;
 

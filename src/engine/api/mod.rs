@@ -117,8 +117,6 @@ pub use surface_repair::{RepairReport, WELD_SHARE_MAX};
 pub use surface_report::SurfaceReport;
 pub use surface_resolve::ResolveReport;
 pub use surface_wrap::SurfaceWrap;
-#[doc(hidden)]
-pub use surface_wrap::wrap_in_words;
 pub use targets::{check_target, inputs_of};
 pub use tasks::Tasks;
 pub use tasks_status::{GatherReport, TaskReport, TaskStage, TaskStatus, task_ranges};

@@ -9,13 +9,12 @@ use super::error::Error;
 use super::surface::{given, refuse_sheets};
 use super::surface_repair::within;
 use super::surface_resolve::report as resolve_report;
-use super::surface_wrap::wrap_in_words;
 use super::{
     CloseReport, RepairReport, ResolveReport, Settings, Surface, SurfaceWrap, WrapReport, guarded,
 };
 use tetdb_base::geom::{counted, short};
 use tetdb_base::storage::{ScratchSpace, attempt};
-use tetdb_base::surface::{closing, repair, validate_with};
+use tetdb_base::surface::{closing, validate_with};
 use tetdb_repair::close::{CloseError, Watcher, close_bytes};
 use tetdb_schema::source::Source;
 
@@ -94,7 +93,7 @@ impl RepairStep {
             }
             Self::Resolve(report) => report.in_words(),
             Self::Winding(report) => report.in_words(),
-            Self::Wrap(report) => wrap_in_words(report),
+            Self::Wrap(report) => report.in_words(),
         }
     }
 }
@@ -193,11 +192,8 @@ impl Surface {
 
     /// Joins points nearer than this share of the diagonal, and puts that on record.
     fn welded_in(&mut self, share: f64, n_defects_before: u64) -> RepairReport {
-        let weld = (share > 0.0).then_some(share);
-        let weld_distance = weld.map(|share| share * self.inner.bounds().diagonal());
-        let (triangles_before, vertices_before) =
-            (self.inner.n_triangles(), self.inner.n_vertices());
-        let done = repair(&mut self.inner, weld_distance);
+        let report = self.repair_in((share > 0.0).then_some(share), n_defects_before);
+        let done = &report.done;
         self.record(Origin::Welded(format!(
             "share={share:e},joined={},dropped={},divided={},turned={}",
             done.points_joined,
@@ -205,14 +201,7 @@ impl Surface {
             done.divided,
             done.turned
         )));
-        RepairReport {
-            weld,
-            weld_distance,
-            done,
-            triangles_before,
-            vertices_before,
-            n_defects_before,
-        }
+        report
     }
 
     /// Puts a repair on record; the store keeps a copy of what came from no file.

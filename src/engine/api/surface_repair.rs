@@ -77,24 +77,29 @@ impl Surface {
         guarded(settings, || {
             let scratch = within(settings, &self.inner, repair_bytes(&self.inner))?;
             let n_defects_before = attempt(|| validate_with(&self.inner, &scratch))?.n_defects;
-            let (triangles_before, vertices_before) =
-                (self.inner.n_triangles(), self.inner.n_vertices());
-            let weld_distance = weld.map(|share| share * self.inner.bounds().diagonal());
-            let mut done = repair(&mut self.inner, weld_distance);
+            let mut report = self.repair_in(weld, n_defects_before);
             // Triangles turned while the surface was read count as well.
-            done.turned += self.turned;
-            self.turned = done.turned;
+            report.done.turned += self.turned;
+            self.turned = report.done.turned;
             self.sources = self.copied(&self.inner);
-            let report = RepairReport {
-                weld,
-                weld_distance,
-                done,
-                triangles_before,
-                vertices_before,
-                n_defects_before,
-            };
             Ok((self, report))
         })
+    }
+
+    /// Joins points nearer than a share of the diagonal, and repairs what needs no guess.
+    pub(super) fn repair_in(&mut self, weld: Option<f64>, n_defects_before: u64) -> RepairReport {
+        let (triangles_before, vertices_before) =
+            (self.inner.n_triangles(), self.inner.n_vertices());
+        let weld_distance = weld.map(|share| share * self.inner.bounds().diagonal());
+        let done = repair(&mut self.inner, weld_distance);
+        RepairReport {
+            weld,
+            weld_distance,
+            done,
+            triangles_before,
+            vertices_before,
+            n_defects_before,
+        }
     }
 }
 

@@ -1,6 +1,5 @@
 //! Closed surfaces around others, at an offset.
 
-use tetdb_base::geom::short;
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface;
 use tetdb_repair::wrap::{WrapError, WrapReport, WrapSettings, wrap};
@@ -39,18 +38,6 @@ impl SurfaceWrap {
         };
         WrapSettings { gap: of(self.gap), offset: of(self.offset) }
     }
-}
-
-/// The counts of a wrap in words.
-pub fn wrap_in_words(report: &WrapReport) -> String {
-    format!(
-        "a closed surface of {} triangles encloses all {} triangles; its vertices are at most {} away, its points up to {}, and points of the surface up to {} below it",
-        report.triangles,
-        report.parts_before,
-        short(report.offset),
-        short(report.distance_to_input_max),
-        short(report.distance_from_input_max),
-    )
 }
 
 impl Surface {

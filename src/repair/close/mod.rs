@@ -106,7 +106,20 @@ pub fn close_bytes(surface: &Surface) -> u64 {
 /// Whether [`close`] is worth trying, told from some triangles in a moment: the coarse mesh of a sheet with thousands of corners on one
 /// circle takes long, and nothing would come of it.
 pub fn is_promising(surface: &Surface) -> bool {
-    WindingTree::new(surface, |_| true).goes_around(PROMISING)
+    tree_around(surface, PROMISING).is_some()
+}
+
+/// A tree of triangles that go around some place, told from `n_most` of them; `None` if none do.
+fn tree_around(surface: &Surface, n_most: usize) -> Option<WindingTree<'_>> {
+    let all = WindingTree::new(surface, |_| true);
+    if all.goes_around(n_most) {
+        return Some(all);
+    }
+    // Walls given from both sides go around nothing: one side of each may.
+    let two_sided = closedness(surface).two_sided;
+    let seconds: BTreeSet<u32> = two_sided.into_iter().map(|[_, second]| second).collect();
+    let tree = WindingTree::new(surface, |t| !seconds.contains(&t));
+    (!seconds.is_empty() && tree.goes_around(n_most)).then_some(tree)
 }
 
 /// Triangles asked by [`is_promising`].
@@ -132,16 +145,7 @@ pub fn close(
     if surface.n_triangles() == 0 {
         return Err(CloseError::NothingInside);
     }
-    let mut tree = WindingTree::new(surface, |_| true);
-    if !tree.goes_around(usize::MAX) {
-        // Walls given from both sides go around nothing.
-        let two_sided = closedness(surface).two_sided;
-        let seconds: BTreeSet<u32> = two_sided.into_iter().map(|[_, second]| second).collect();
-        tree = WindingTree::new(surface, |t| !seconds.contains(&t));
-        if seconds.is_empty() || !tree.goes_around(usize::MAX) {
-            return Err(CloseError::NothingInside);
-        }
-    }
+    let tree = tree_around(surface, usize::MAX).ok_or(CloseError::NothingInside)?;
     let mut mesh = coarse(surface, watch)?;
     let sides = choose_sides(&mut mesh, &tree, watch);
     if sides.volume == 0.0 {

@@ -1,29 +1,13 @@
 use std::collections::BTreeSet;
 
 use super::*;
+use crate::tests::{Named, p, surface};
 use tetdb_base::geom::mix;
 use tetdb_base::storage::{CancelToken, RunContext, attempt};
-use tetdb_base::surface::{SurfaceBuilder, orient_alike, validate};
+use tetdb_base::surface::{orient_alike, validate};
 use tetdb_kernel::samples::SampleSpec;
 
-type Named = (&'static str, [Point; 3]);
-
 fn silent(_: &'static str, _: u64, _: u64) {}
-
-fn p(x: f64, y: f64, z: f64) -> Point {
-    Point::new(x, y, z)
-}
-
-fn surface(triangles: &[Named]) -> Surface {
-    let mut builder = SurfaceBuilder::new();
-    builder.begin_file("made");
-    for (name, corners) in triangles {
-        let label = builder.label(name);
-        builder.triangle_at(*corners, label).expect("finite corners");
-    }
-    builder.end_file().expect("triangles");
-    builder.finish()
-}
 
 /// A grid of `n` by `m` quadrilaterals, each cut in two; `at` places its corners.
 fn grid(n: usize, m: usize, at: impl Fn(usize, usize) -> Point) -> Vec<Named> {

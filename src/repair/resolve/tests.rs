@@ -1,25 +1,9 @@
 use std::collections::BTreeMap;
 
 use super::*;
+use crate::tests::{Named, p, surface};
 use tetdb_base::geom::mix;
-use tetdb_base::surface::{ContactKind, SurfaceBuilder, closedness, validate};
-
-type Named = (&'static str, [Point; 3]);
-
-fn surface(triangles: &[Named]) -> Surface {
-    let mut builder = SurfaceBuilder::new();
-    builder.begin_file("made");
-    for (name, corners) in triangles {
-        let label = builder.label(name);
-        builder.triangle_at(*corners, label).expect("finite corners");
-    }
-    builder.end_file().expect("triangles");
-    builder.finish()
-}
-
-fn p(x: f64, y: f64, z: f64) -> Point {
-    Point::new(x, y, z)
-}
+use tetdb_base::surface::{ContactKind, closedness, validate};
 
 /// A box from `low` to `high`, turned by `turn` about the axis (1, 2, 3).
 fn block(name: &'static str, low: Point, high: Point, turn: f64) -> Vec<Named> {

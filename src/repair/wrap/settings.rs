@@ -1,6 +1,6 @@
 //! What is asked for, what was done, and why not.
 
-use tetdb_base::geom::Point;
+use tetdb_base::geom::{Point, short};
 
 /// What to do. Lengths are in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +40,20 @@ pub struct WrapReport {
     pub distance_from_input_mean: f64,
     /// Number of samples, both ways.
     pub samples: u64,
+}
+
+impl WrapReport {
+    /// The counts in words.
+    pub fn in_words(&self) -> String {
+        format!(
+            "a closed surface of {} triangles encloses all {} triangles; its vertices are at most {} away, its points up to {}, and points of the surface up to {} below it",
+            self.triangles,
+            self.parts_before,
+            short(self.offset),
+            short(self.distance_to_input_max),
+            short(self.distance_from_input_max),
+        )
+    }
 }
 
 /// Reasons why there is no wrap.
