@@ -10,7 +10,7 @@ use tetdb_base::geom::{Point, mix};
 use tetdb_base::storage::{Backing, Budget, Pager, ScratchSpace, attempt};
 use tetdb_base::surface::Surface;
 use tetdb_engine::pipeline::{self, MeshOptions, Options, OptionsText, silent};
-use tetdb_kernel::bisect::{self, CutPlan, CutReport, Method, load_of};
+use tetdb_kernel::bisect::{self, CutPlan, CutReport, PlaneChoice, load_of};
 use tetdb_kernel::mesh::{Mesh, Workspace, renumber};
 use tetdb_kernel::optimize::{Mode, Settings};
 use tetdb_kernel::samples::SampleSpec;
@@ -65,7 +65,7 @@ impl Bench {
     }
 
     /// Cuts the coarse mesh in halves with `bytes` of frames.
-    fn cut(&self, method: Method, bytes: u64) -> Cut {
+    fn cut(&self, plane: PlaneChoice, bytes: u64) -> Cut {
         let space = Workspace { dir: &self.dir.path().into(), memory: 64 << 20 };
         let bounds = self.surface.bounds();
         let mut host = self.pool(None, bytes / 2);
@@ -84,13 +84,16 @@ impl Bench {
         let plan = CutPlan {
             cut: 1,
             low: 0.5,
-            method,
+            plane,
             earlier: &[],
             h: &|p| self.field.h(p),
             bounds,
             optimize: Settings::of(Mode::Full),
         };
-        let opened = bisect::open(&mut host, &mut core, &plan, &space, &|_, _| {}).expect("room");
+        let opened = {
+            let refined = bisect::refine(&mut host, &plan, space.dir, &|_, _| {});
+            bisect::choose(&mut host, &mut core, &plan, refined, None, &|_, _| {})
+        };
         let (mut digest, mut tets, mut pages) = (0u64, 0, 0);
         for high in [false, true] {
             let name = format!("child-{high}.redb");
@@ -214,7 +217,7 @@ fn main() {
     let asked = |name: &str| only.as_deref().is_none_or(|o| o == name);
     let bench = Bench::new(&sample);
     let plenty = 4 << 30;
-    let whole = bench.cut(Method::default(), plenty);
+    let whole = bench.cut(PlaneChoice::default(), plenty);
     println!("{sample}: {} triangles", bench.surface.n_triangles());
     tell("as it is", &whole);
     if asked("balance") {
@@ -245,7 +248,7 @@ fn main() {
     println!("the finished mesh will have about {predicted:.0} tetrahedra");
     if asked("pool") {
         let bytes = (BYTES_PER_TET * predicted / 20.0) as u64;
-        let pool = attempt(|| bench.cut(Method::default(), bytes)).expect("room");
+        let pool = attempt(|| bench.cut(PlaneChoice::default(), bytes)).expect("room");
         tell("frames for 5 %", &pool);
         println!(
             "{:22} {} tetrahedra, {} pages, {} frames, {} read, {} written; {:.2} times the time; {}",

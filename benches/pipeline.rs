@@ -1,8 +1,6 @@
 //! From a surface to a sealed store, stage by stage, through the library: resident, in one sub-domain.
 //!
-//! `cargo bench --bench pipeline -- [sample|file [none|delaunay|full [ends|blocks]]]`; without arguments a smoke size. With `ends`,
-//! lengths between the vertices of the surface are interpolated along divided edges, the paper's way; with `blocks`, all is done in
-//! blocks. Seconds are those the main thread was on a processor where the system tells them, else those that passed.
+//! `cargo bench --bench pipeline -- [sample|file [none|delaunay|full]]`; without arguments a smoke size. Seconds are those the main thread was on a processor where the system tells them, else those that passed.
 
 use std::cell::RefCell;
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
@@ -13,8 +11,6 @@ use tetdb_base::geom::Point;
 use tetdb_base::storage::Budget;
 use tetdb_base::surface::Surface;
 use tetdb_engine::pipeline::{self, Event, Options, OptionsText, RunOptions};
-use tetdb_kernel::bisect::Method;
-use tetdb_kernel::refine::Lengths;
 use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::Job;
 use tetdb_schema::record::{SealedVertex, tag};
@@ -81,17 +77,10 @@ fn main() {
     let mut words = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
     let word = words.next().unwrap_or_else(|| "balls,count=4".to_owned());
     let optimize = words.next();
-    let variant = words.next();
-    let lengths = match variant.as_deref() {
-        Some("ends") => Lengths::Ends,
-        _ => Lengths::Field,
-    };
-    let in_blocks = variant.as_deref() == Some("blocks");
     let text = OptionsText { optimize, subdomains: Some("1".to_owned()), ..OptionsText::default() };
-    let method = Method { lengths, in_blocks, ..Method::default() };
     let options = Options {
         mesh: text.try_into().expect("a word of --optimize"),
-        run: RunOptions { method, ..RunOptions::default() },
+        run: RunOptions::default(),
     };
     let surface: Surface = match Path::new(&word) {
         file if file.is_file() => {

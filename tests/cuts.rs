@@ -12,7 +12,7 @@ use tetdb_base::surface::Surface;
 use tetdb_engine::pipeline::{
     self, MeshOptions, Options, PipelineError, RunOptions, Subdomains, silent,
 };
-use tetdb_kernel::bisect::{CutReport, Method, Plane, PlaneChoice, choose_plane};
+use tetdb_kernel::bisect::{CutReport, Plane, PlaneChoice, choose_plane};
 use tetdb_kernel::mesh::Mesh;
 use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::Job;
@@ -32,10 +32,10 @@ fn mesh_cut_by<T>(
 ) -> Result<(CutReport, T), PipelineError> {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("two.tetdb");
-    let method = Method { plane: PlaneChoice::Given(plane), ..Method::default() };
+    let plane = PlaneChoice::Given(plane);
     let options = Options {
         mesh: MeshOptions { subdomains: Subdomains::Exactly(2), ..MeshOptions::default() },
-        run: RunOptions { method, ..RunOptions::default() },
+        run: RunOptions { plane, ..RunOptions::default() },
     };
     let budget = Budget::new(256 << 20);
     let mut catalog = Catalog::create(&path, &Job::default()).expect("an empty place");

@@ -8,7 +8,6 @@
 //! | [`sizing`] | wanted edge lengths, load, estimate |
 //! | [`samples`] | generated surfaces |
 //! | [`boundary`] | input segments and facets appear |
-//! | [`refine`] | edges are divided until none is too long |
 //! | [`optimize`] | the worst tetrahedra become better |
 //! | [`blocks`] | saturation and smoothing in blocks, on all threads |
 //! | [`bisect`] | one cut: plane, zone, interface, two children |
@@ -26,7 +25,6 @@ pub mod delaunay;
 pub mod mesh;
 pub mod optimize;
 pub mod reconnect;
-pub mod refine;
 pub mod samples;
 pub mod sizing;
 pub mod topology;

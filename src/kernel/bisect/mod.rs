@@ -44,32 +44,13 @@ pub use zone::{OutsideZones, WIDTH_MIN, WIDTH_NOISE, Zone};
 
 use std::time::Instant;
 
-use crate::blocks;
-use crate::mesh::{Mesh, Workspace};
+use crate::blocks::{self, Field, RefineReport};
+use crate::mesh::Mesh;
 use crate::optimize::{self, Mode, Settings};
-use crate::refine::{Field, Lengths, RefineReport, saturate};
 use tetdb_base::geom::{Aabb, Point};
-use tetdb_base::storage::{Pages, StorageError};
+use tetdb_base::storage::{DiskPath, Pages};
 
-/// Variants of the method, for comparisons; the default is the method.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Method {
-    /// Lengths of edges: from the field or from the ends.
-    pub lengths: Lengths,
-    /// Choice of the cutting plane.
-    pub plane: PlaneChoice,
-    /// True to saturate in blocks where lengths come from the field. Not finished.
-    pub in_blocks: bool,
-}
-
-impl Method {
-    /// Returns whether saturation goes in blocks.
-    pub fn uses_blocks(&self) -> bool {
-        self.in_blocks && self.lengths == Lengths::Field
-    }
-}
-
-/// Sweeps of smoothing of a core whose surroundings are smoothed in blocks, once more with all but its interface. On a box of 1.2 M the
+/// Sweeps of smoothing of a core at most, since its surroundings are smoothed later, once more with all but its interface. On a box of 1.2 M the
 /// Kolmogorov distance of qualities near the interface is 0.008 with two, 0.018 with three and 0.038 with as many as bring the core to rest.
 const CORE_SWEEPS: u32 = 2;
 
@@ -80,8 +61,8 @@ pub struct CutPlan<'a> {
     pub cut: u32,
     /// Share of the load that belongs on the low side.
     pub low: f64,
-    /// Variant of the method.
-    pub method: Method,
+    /// Choice of the cutting plane.
+    pub plane: PlaneChoice,
     /// Zones of the cuts above it.
     pub earlier: &'a [Zone],
     /// Wanted length at a position.
@@ -110,52 +91,35 @@ pub struct InterfaceFaces {
     pub chosen: Vec<[Point; 3]>,
 }
 
-/// Refines the zone of a cut in `host` and chooses the interface in `core`, which must be empty.
+/// The first part of a cut: the plane is chosen and its zone refined. `dir` takes what leaves memory.
 ///
-/// `progress` receives a stage and how much of it is done. Effects: all ids of `host` may change. Errors: the disk.
-pub fn open<P: Pages, Q: Pages>(
-    host: &mut Mesh<P>,
-    core: &mut Mesh<Q>,
-    plan: &CutPlan,
-    space: &Workspace,
-    progress: &dyn Fn(&'static str, u64),
-) -> Result<OpenCut, StorageError> {
-    let refined = refine(host, plan, space, progress)?;
-    Ok(choose(host, core, plan, refined, None, progress))
-}
-
-/// The first part of [`open`]: the plane is chosen and its zone refined.
-///
-/// Errors: the disk.
+/// `progress` receives a stage and how much of it is done. Effects: all ids of tetrahedra of `host` may change. Unwinds with errors of
+/// the disk.
 pub fn refine<P: Pages>(
     host: &mut Mesh<P>,
     plan: &CutPlan,
-    space: &Workspace,
+    dir: &DiskPath,
     progress: &dyn Fn(&'static str, u64),
-) -> Result<RefinedZone, StorageError> {
+) -> RefinedZone {
     let clock = Instant::now();
     let mut seconds = StageSeconds::default();
     progress("choose a plane", 0);
     plane::set_sizes(host, plan.h);
-    let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.method.plane);
+    let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.plane);
     seconds.plane = clock.elapsed().as_secs_f64();
     let zone = Zone { cut: plan.cut, surface: plane.plane };
     let field = Field {
-        lengths: plan.method.lengths,
         h: plan.h,
-        place: &zone::InZone { zone: &zone, earlier: plan.earlier, h: plan.h },
+        place: &zone::InZone { zone: &zone, earlier: plan.earlier },
         bounds: plan.bounds,
     };
     let progress = &mut |n| progress("refine the zone", n);
-    let refine = match plan.method.uses_blocks() {
-        true => blocks::saturate(host, &field, Mode::None, space.dir, progress).refine,
-        false => saturate(host, &field, space, progress)?,
-    };
+    let refine = blocks::saturate(host, &field, Mode::None, dir, progress).refine;
     seconds.zone = clock.elapsed().as_secs_f64() - seconds.plane;
-    Ok(RefinedZone { zone, plane, refine, seconds })
+    RefinedZone { zone, plane, refine, seconds }
 }
 
-/// The second part of [`open`]: chooses the interface in `core`, which must be empty; `faces` receives the natural and
+/// The second part: chooses the interface in `core`, which must be empty; `faces` receives the natural and
 /// the chosen faces.
 pub fn choose<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
@@ -170,9 +134,7 @@ pub fn choose<P: Pages, Q: Pages>(
     progress("choose the interface", 0);
     let core_boundary = core::extract(host, core, &zone.surface);
     let mut settings = plan.optimize;
-    if plan.method.uses_blocks() {
-        settings.odt_sweeps = settings.odt_sweeps.min(CORE_SWEEPS);
-    }
+    settings.odt_sweeps = settings.odt_sweeps.min(CORE_SWEEPS);
     optimize::run_with(core, settings, &|_| {});
     seconds.core = clock.elapsed().as_secs_f64();
     let natural = faces.as_mut().map(|f| &mut f.natural);

@@ -2,7 +2,7 @@
 
 use super::interface::InterfaceReport;
 use super::load_profile::ChosenPlane;
-use crate::refine::RefineReport;
+use crate::blocks::RefineReport;
 
 /// The report of a cut.
 #[derive(Clone, Copy, Debug, PartialEq)]

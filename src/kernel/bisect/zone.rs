@@ -5,7 +5,7 @@
 //! any other place).
 
 use super::surface::{CuttingSurface, Plane};
-use crate::refine::PlacementRule;
+use crate::blocks::PlacementRule;
 use tetdb_base::geom::{Point, mix};
 use tetdb_schema::tree::CutPlane;
 
@@ -69,7 +69,6 @@ impl Zone {
 pub(super) struct InZone<'a> {
     pub zone: &'a Zone,
     pub earlier: &'a [Zone],
-    pub h: &'a (dyn Fn(Point) -> f64 + Sync),
 }
 
 /// Reach of a zone from the surface, in units of h at a point not yet in it: a third more than its width, because the
@@ -95,16 +94,6 @@ impl PlacementRule for InZone<'_> {
         near || (low && high)
     }
 
-    fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]> {
-        if both_in_one(self.earlier, self.h, [a, b], sizes) {
-            return None;
-        }
-        let surface = &self.zone.surface;
-        let near = a + (b - a) * surface.nearest(a, b);
-        let h = (self.h)(near);
-        surface.band(a, b, REACH * h)
-    }
-
     fn coarse_length(&self, p: Point, h: f64) -> f64 {
         let beyond = self.zone.surface.distance(p).abs() - (WIDTH_MIN + WIDTH_NOISE) * h;
         h.max(COARSE_SLOPE * beyond)
@@ -119,47 +108,16 @@ impl PlacementRule for InZone<'_> {
     }
 }
 
-/// Returns whether one zone holds both ends of an edge: the edge was saturated there, and its optimized form is final.
-///
-/// Rounded sizes rule out most edges without a call of the field.
-fn both_in_one(
-    zones: &[Zone],
-    h: &dyn Fn(Point) -> f64,
-    [a, b]: [Point; 2],
-    [near_a, near_b]: [f64; 2],
-) -> bool {
-    let may_be = |zone: &Zone| {
-        zone.is_final(a, near_a * ROUNDED_UP) && zone.is_final(b, near_b * ROUNDED_UP)
-    };
-    if !zones.iter().any(may_be) {
-        return false;
-    }
-    let (ha, hb) = (h(a), h(b));
-    (zones.iter()).any(|zone| zone.is_final(a, ha) && zone.is_final(b, hb))
-}
-
-/// Factor that undoes rounding to `f32` downwards.
-const ROUNDED_UP: f64 = 1.0 + 1e-6;
-
 /// Everywhere but in the zones of earlier cuts.
-pub struct OutsideZones<'a> {
-    /// Zones of earlier cuts.
-    pub zones: &'a [Zone],
-    /// Wanted edge length at a position.
-    pub h: &'a (dyn Fn(Point) -> f64 + Sync),
-}
+pub struct OutsideZones<'a>(pub &'a [Zone]);
 
 impl PlacementRule for OutsideZones<'_> {
-    fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]> {
-        (!both_in_one(self.zones, self.h, [a, b], sizes)).then_some([0.0, 1.0])
-    }
-
     fn admits(&self, _: Point, _: f64) -> bool {
         true
     }
 
     fn forbids(&self, p: Point, h: f64) -> bool {
-        self.zones.iter().any(|zone| zone.is_final(p, h))
+        self.0.iter().any(|zone| zone.is_final(p, h))
     }
 }
 

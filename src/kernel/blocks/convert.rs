@@ -3,12 +3,12 @@
 use tetdb_schema::page::NONE;
 
 use super::brick::{Bricks, SLOT_BITS, SLOT_MASK, Slot};
+use super::field::Field;
 use super::flat::Vertex;
 use super::partition::KdPartition;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
 use crate::mesh::{FaceRef, Mesh, Tet, dense, sparse};
-use crate::refine::Field;
 use tetdb_base::geom::mix;
 use tetdb_base::storage::{Pages, StorageError, raise};
 

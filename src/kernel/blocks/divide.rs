@@ -3,14 +3,16 @@
 //! Rounds of candidates, sorted along the curve. Of candidates close together their mean is tried. What reaches beyond the region is put
 //! off: its tetrahedron stays unexamined, for a neighbor that comes later.
 
+use super::field::Field;
 use super::insert::{Inserter, Refusal};
 use super::partition::KdPartition;
+use super::recent::Recent;
 use super::region::Region;
+use super::report::RefineReport;
 use super::spawn::{Candidate, GOOD, Spawner, center, is_in};
 use crate::mesh::Tet;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{FROZEN, MARK};
-use crate::refine::{Field, Recent, RefineReport};
 use tetdb_base::geom::{HilbertFrame, Point};
 use tetdb_base::storage::check_cancelled;
 
@@ -72,8 +74,8 @@ impl Divider {
             .collect();
         let mut front = true;
         self.second.clear();
-        while !(list.is_empty() && self.second.is_empty()) && report.passes < ROUNDS_MAX {
-            report.passes += 1;
+        while !(list.is_empty() && self.second.is_empty()) && report.rounds < ROUNDS_MAX {
+            report.rounds += 1;
             let before = report.inserted;
             self.next.clear();
             self.spawner.waiting.clear();
@@ -171,6 +173,8 @@ impl Divider {
                 Err(refusal) => {
                     let count = match refusal {
                         Refusal::Near => &mut report.near,
+                        Refusal::OutOfPlace => &mut report.out_of_place,
+                        Refusal::Frozen => &mut report.frozen_hits,
                         _ => &mut report.blocked,
                     };
                     *count += 1;
@@ -244,11 +248,17 @@ impl Divider {
         };
         let flat = HEIGHT * f64::from(c.h);
         let is_flat = inserter.faces().iter().any(|f| f.required && height(f.vertices) < flat);
-        let is_frozen =
-            || inserter.cavity().iter().any(|&t| mesh.attributes[t as usize].1 & FROZEN != 0);
-        if is_flat || field.place.forbids(c.point, f64::from(c.h)) || is_frozen() {
+        let is_frozen = |&t: &u32| mesh.attributes[t as usize].1 & FROZEN != 0;
+        let refusal = if is_flat {
+            Some(Refusal::Near)
+        } else if field.place.forbids(c.point, f64::from(c.h)) {
+            Some(Refusal::OutOfPlace)
+        } else {
+            inserter.cavity().iter().any(is_frozen).then_some(Refusal::Frozen)
+        };
+        if let Some(refusal) = refusal {
             inserter.discard(mesh);
-            return Err(Refusal::Near);
+            return Err(refusal);
         }
         let brick = region.bricks.binary_search(&partition.find(c.point));
         let v = region.add_vertex(c.point, c.h, brick.map_or(own, |place| place as u32));

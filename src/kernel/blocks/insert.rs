@@ -45,6 +45,10 @@ pub(super) struct OuterFace {
 pub(super) enum Refusal {
     /// A vertex is too near.
     Near,
+    /// Its place is not to be changed.
+    OutOfPlace,
+    /// The cavity holds a tetrahedron frozen beside an interface.
+    Frozen,
     /// No cavity keeps the required faces, or the walk met one.
     Blocked,
     /// The cavity or the walk leads out of the arrays: a neighbor has to do it.

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::field::Field;
 use crate::mesh::anatomy::EDGES;
 use crate::mesh::{Mesh, dense, sparse};
-use crate::refine::Field;
 use crate::sizing::TETS_PER_LOAD;
 use tetdb_base::geom::{Point, mix, orient};
 use tetdb_base::storage::{Pages, parallel, spare_threads};

@@ -3,11 +3,11 @@
 //! A coarse mesh of a surface has tetrahedra from wall to wall. Before it is divided into blocks, those with an edge of several wanted lengths
 //! get their center, if that is far enough from all vertices.
 
+use super::field::Field;
 use crate::delaunay::Kernel;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGES, FACES, FROZEN, MARK};
 use crate::mesh::{Mesh, dense, sparse};
-use crate::refine::Field;
 use tetdb_base::geom::{HilbertFrame, Point, mix, orient};
 use tetdb_base::storage::{Pages, check_cancelled};
 

@@ -6,13 +6,13 @@
 //!
 //! Source: S. Rebay, "Efficient unstructured mesh generation by means of Delaunay triangulation and Bowyer–Watson algorithm" (1993).
 
+use super::field::Field;
 use super::flat::FlatMesh;
 use super::region::{OUTSIDE, Region};
 use super::side_by_side::volume_and_center;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{FACES, MARK};
 use crate::mesh::{End, Tet};
-use crate::refine::Field;
 use tetdb_base::geom::{HilbertFrame, Point, orient};
 
 /// Least distance to a vertex, in units of the mean of both wanted lengths.

@@ -17,8 +17,8 @@ use tetdb_base::storage::parallel;
 /// of large triangles have a sixth more and a third fewer tetrahedra. With 0.5 and 0.6 h from vertices half of 42
 /// surfaces are off by more than 3.4 and 4.5 %.
 const SKIN: SurfaceSkin = SurfaceSkin { triangles: 0.2, vertices: 0.57 };
-/// Vertices per unit of load in the inside: 1.68 to 1.74 on balls, a box and three scans.
-const VERTICES_PER_LOAD: f64 = 1.69;
+/// Vertices per unit of load in the inside.
+const VERTICES_PER_LOAD: f64 = 1.74;
 /// Tetrahedra per wanted length of a needle's edges beyond [`NEEDLE_FROM`]. With none, surfaces of fans and needles (a wing, slats) have a
 /// third to a half fewer than there are; with 0.15 plates with holes a tenth more.
 const TETS_PER_CROSSING: f64 = 0.1;

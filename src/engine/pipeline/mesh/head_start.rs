@@ -18,7 +18,6 @@ use tetdb_base::storage::{
 use tetdb_base::surface::Surface;
 use tetdb_kernel::delaunay::KernelStats;
 use tetdb_kernel::mesh::Mesh;
-use tetdb_kernel::refine::{PATTERN_BYTES, find_pattern};
 
 /// Bytes of frames per vertex: 6.4 to 7.2 tetrahedra, the vertex and its attribute. A mesh that needs more is dropped and built
 /// later.
@@ -33,9 +32,6 @@ const BESIDE_VERTEX: u64 = 24;
 /// besides.
 const LOOK_TRIANGLE: u64 = 160;
 const LOOK_LEAST: u64 = 16 << 20;
-/// Fewest surface vertices for which the pattern is searched. From here on, the interior may have space for pieces of the
-/// pattern, and the run takes longer than the search (50 ms).
-const PATTERN_FROM: u64 = 1 << 12;
 
 /// A mesh with the vertices and facets of a surface, built before the store exists.
 pub struct HeadStart {
@@ -69,8 +65,6 @@ struct HeadStartShare {
     all: u64,
     /// Upper limit of the frames once sizes are known. Frames that are not touched take no memory.
     frames_later: u64,
-    /// True if there is also memory to search for the pattern's tetrahedra.
-    finds_pattern: bool,
 }
 
 impl HeadStartShare {
@@ -86,13 +80,8 @@ impl HeadStartShare {
         let look = LOOK_TRIANGLE * triangles + LOOK_LEAST;
         // Once sizes are known, frames of the head start count as frames of the plan.
         let plan = Plan::new(cap, held + LOOK_LEAST).ok()?;
-        let left = cap.checked_sub(held + all + look)?;
-        (frames <= plan.frames).then_some(Self {
-            frames,
-            all,
-            frames_later: Plan::new(cap, held).ok()?.frames,
-            finds_pattern: points >= PATTERN_FROM && left >= PATTERN_BYTES,
-        })
+        let has_room = held + all + look <= cap && frames <= plan.frames;
+        has_room.then_some(Self { frames, all, frames_later: Plan::new(cap, held).ok()?.frames })
     }
 }
 
@@ -118,11 +107,6 @@ pub fn head_start<T, E>(
         let (made, is_vain, share) = (&made, &is_vain, &share);
         scope.spawn(move |_| {
             let start = begin(surface, share, is_vain, tell);
-            if start.is_some() && share.finds_pattern {
-                // Only code that needs the pattern waits for this search. A search that fails here fails there again, and is
-                // reported there.
-                rayon::spawn(|| drop(attempt(find_pattern)));
-            }
             *made.lock().expect("nobody else has it yet") = start;
         });
         let vain = Vain(is_vain);
@@ -261,7 +245,7 @@ mod tests {
             });
             assert!(matches!(looked, Ok((0, None))));
         }
-        let share = HeadStartShare { frames: 0, all: 0, frames_later: CAP, finds_pattern: false };
+        let share = HeadStartShare { frames: 0, all: 0, frames_later: CAP };
         let (tell, _hear) = channel();
         assert!(begin(&surface, &share, &AtomicBool::new(false), tell.clone()).is_some());
         assert!(begin(&surface, &share, &AtomicBool::new(true), tell).is_none());

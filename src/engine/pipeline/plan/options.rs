@@ -2,7 +2,7 @@
 
 use super::Plan;
 use crate::pipeline::work::RemoteWorkers;
-use tetdb_kernel::bisect::Method;
+use tetdb_kernel::bisect::PlaneChoice;
 use tetdb_kernel::boundary::RegionRule;
 use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::{Length, SizeOptions};
@@ -100,8 +100,8 @@ pub struct RunOptions {
     pub coarse_only: bool,
     /// Remote workers that share the work.
     pub remote: RemoteWorkers,
-    /// Method of choosing cuts, for comparisons. A resumed run uses the default method.
-    pub method: Method,
+    /// Choice of the cutting planes, for comparisons. A resumed run uses the default.
+    pub plane: PlaneChoice,
     /// Settings for tests.
     pub trial: Trial,
 }

@@ -2,7 +2,7 @@
 
 use crate::pipeline::plan::Options;
 use tetdb_base::geom::Aabb;
-use tetdb_kernel::bisect::Method;
+use tetdb_kernel::bisect::PlaneChoice;
 use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::SizeField;
 use tetdb_store::sealed::Form;
@@ -12,7 +12,7 @@ use tetdb_store::sealed::Form;
 pub struct Common<'a> {
     pub field: &'a SizeField,
     pub mode: Mode,
-    pub method: Method,
+    pub plane: PlaneChoice,
     pub bounds: Aabb,
     pub form: Form,
     /// True if coarse snapshots are kept.
@@ -26,7 +26,7 @@ impl<'a> Common<'a> {
         Self {
             field,
             mode: options.mesh.optimize,
-            method: options.run.method,
+            plane: options.run.plane,
             bounds,
             form: options.mesh.seal,
             keeps_coarse: !options.mesh.drop_coarse,

@@ -63,7 +63,7 @@ impl CutJob<'_> {
         let plan = CutPlan {
             cut: ranks.cut(),
             low: ranks.low_share(),
-            method: common.method,
+            plane: common.plane,
             earlier: &self.zones,
             h: &|p| common.field.h(p),
             bounds: common.bounds,
@@ -83,7 +83,7 @@ impl CutJob<'_> {
         if let Some(kept) = &kept {
             kept.save(&mut host, Stage::Coarse, &mut stages, watch)?;
         }
-        let refined = bisect::refine(&mut host, &plan, &space, &progress)?;
+        let refined = bisect::refine(&mut host, &plan, &self.scratch, &progress);
         if let Some(kept) = &kept {
             kept.save(&mut host, Stage::Refined, &mut stages, watch)?;
         }

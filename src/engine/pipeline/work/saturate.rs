@@ -3,14 +3,12 @@
 use std::time::Instant;
 
 use super::common::Common;
-use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
-use tetdb_base::storage::Pages;
+use tetdb_base::storage::{DiskPath, Pages};
 use tetdb_kernel::bisect::{OutsideZones, Zone};
-use tetdb_kernel::blocks;
-use tetdb_kernel::mesh::{Mesh, Workspace};
+use tetdb_kernel::blocks::{self, Everywhere, Field, PlacementRule, RefineReport};
+use tetdb_kernel::mesh::Mesh;
 use tetdb_kernel::optimize::{self, Mode, OptimizeReport};
-use tetdb_kernel::refine::{Everywhere, Field, PlacementRule, RefineReport, saturate};
 use tetdb_kernel::sizing::SizeField;
 
 /// Report of the fine step.
@@ -30,9 +28,9 @@ pub fn saturate_and_optimize<P: Pages>(
     field: &SizeField,
     common: Common,
     zones: &[Zone],
-    space: &Workspace,
+    dir: &DiskPath,
     watch: &Watcher,
-) -> Result<FineReport, PipelineError> {
+) -> FineReport {
     watch(Event { stage: "divide edges", done: 0, total: None, unit: "vertices" });
     let clock = Instant::now();
     for v in mesh.vertex_ids() {
@@ -40,29 +38,21 @@ pub fn saturate_and_optimize<P: Pages>(
         mesh.set_size(v, field.h(p) as f32);
     }
     let h = |p| field.h(p);
-    let outside = OutsideZones { zones, h: &h };
+    let outside = OutsideZones(zones);
     let place: &dyn PlacementRule = if zones.is_empty() { &Everywhere } else { &outside };
-    let wanted =
-        Field { h: &|p| field.h(p), place, lengths: common.method.lengths, bounds: common.bounds };
-    let told = |inserted| {
+    let wanted = Field { h: &h, place, bounds: common.bounds };
+    let told = &mut |inserted| {
         watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
     };
-    if common.method.uses_blocks() {
-        let told = &mut |inserted| told(inserted);
-        let report = blocks::saturate(mesh, &wanted, common.mode, space.dir, told);
-        let refined = clock.elapsed().as_secs_f64();
-        let mut optimize =
-            OptimizeReport { operations: report.operations, ..OptimizeReport::default() };
-        match common.mode {
-            Mode::Full => optimize.mended = optimize::mend(mesh, &|p| watch(p.into())),
-            Mode::Delaunay => mesh.refresh_tet_of(),
-            Mode::None => optimize = optimize::run(mesh, common.mode, &|p| watch(p.into())),
-        }
-        let seconds = [refined, clock.elapsed().as_secs_f64() - refined];
-        return Ok(FineReport { refine: report.refine, optimize, seconds });
-    }
-    let refine = saturate(mesh, &wanted, space, &mut |inserted| told(inserted))?;
+    let report = blocks::saturate(mesh, &wanted, common.mode, dir, told);
     let refined = clock.elapsed().as_secs_f64();
-    let optimize = optimize::run(mesh, common.mode, &|p| watch(p.into()));
-    Ok(FineReport { refine, optimize, seconds: [refined, clock.elapsed().as_secs_f64() - refined] })
+    let mut optimize =
+        OptimizeReport { operations: report.operations, ..OptimizeReport::default() };
+    match common.mode {
+        Mode::Full => optimize.mended = optimize::mend(mesh, &|p| watch(p.into())),
+        Mode::Delaunay => mesh.refresh_tet_of(),
+        Mode::None => optimize = optimize::run(mesh, common.mode, &|p| watch(p.into())),
+    }
+    let seconds = [refined, clock.elapsed().as_secs_f64() - refined];
+    FineReport { refine: report.refine, optimize, seconds }
 }

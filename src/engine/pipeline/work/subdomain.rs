@@ -19,7 +19,7 @@ use crate::pipeline::seal::totals::{journal, totals_of};
 use crate::pipeline::tree::open_subtree;
 use tetdb_base::storage::{Backing, DiskPath, PagerStats, attempt};
 use tetdb_kernel::bisect::Zone;
-use tetdb_kernel::mesh::{Mesh, Workspace};
+use tetdb_kernel::mesh::Mesh;
 use tetdb_kernel::sizing::{SizeField, TETS_PER_LOAD};
 use tetdb_schema::blob::BlobContent;
 use tetdb_schema::catalog::{CoarseRow, StoreState};
@@ -93,7 +93,6 @@ impl SubdomainJob {
         watch: &Watcher,
     ) -> Result<FinishedSubdomain, PipelineError> {
         let clock = Instant::now();
-        let space = Workspace { dir: &self.scratch, memory: self.share.buffers / 2 };
         let (rank, coarse) = (self.mesh.ranks.first, self.mesh.generation);
         let kept = match &self.kept {
             Some(path) => Some(save(&mut mesh, path, rank, coarse, self.share.buffers)?),
@@ -105,9 +104,9 @@ impl SubdomainJob {
             self.field.as_ref().unwrap_or(common.field),
             common,
             &self.zones,
-            &space,
+            &self.scratch,
             watch,
-        )?;
+        );
         let generation = self.generation;
         let target = SealTarget {
             path: &self.sealed,
@@ -152,6 +151,7 @@ impl FinishedSubdomain {
             ("over_constrained_tets", refine.over_constrained as f64),
             ("zone_rejects", refine.out_of_place as f64),
             ("frozen_hits", refine.frozen_hits as f64),
+            ("unexamined_tets", refine.unexamined as f64),
             ("pages_read", self.pages.pages_read as f64),
             ("pages_written", self.pages.pages_written as f64),
             ("frames_used", self.frames_used as f64),

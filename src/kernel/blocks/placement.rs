@@ -2,22 +2,17 @@
 
 use tetdb_base::geom::Point;
 
-/// A part of space in which edges are divided.
+/// A part of space in which tetrahedra are divided.
 pub trait PlacementRule: Sync {
     /// Whether [`PlacementRule::reaches`] is worth asking: most tetrahedra are out of reach.
     fn is_partial(&self) -> bool {
         false
     }
 
-    /// Whether points that divide edges of this tetrahedron may be of use; `sizes` are those of its corners.
+    /// Whether points near this tetrahedron may be of use; `sizes` are those of its corners.
     fn reaches(&self, _points: &[Point; 4], _sizes: &[f32; 4]) -> bool {
         true
     }
-
-    /// The stretch of the way from `a` to `b` on which points are of use, as parameters in [0, 1]; `None` when there is none.
-    ///
-    /// It may be too long, never too short. `sizes` are the wanted lengths at the ends, rounded to `f32`, or infinite where they are not known.
-    fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]>;
 
     /// The length for which coarse points around the part are spread, where the wanted length is `h`: it grows away from the part.
     fn coarse_length(&self, _p: Point, h: f64) -> f64 {
@@ -36,9 +31,6 @@ pub trait PlacementRule: Sync {
 pub struct Everywhere;
 
 impl PlacementRule for Everywhere {
-    fn stretch(&self, _: Point, _: Point, _: [f64; 2]) -> Option<[f64; 2]> {
-        Some([0.0, 1.0])
-    }
     fn admits(&self, _: Point, _: f64) -> bool {
         true
     }

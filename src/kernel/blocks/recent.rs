@@ -1,6 +1,5 @@
 //! The points inserted last, as the first that the next one is compared with.
 
-use super::candidate::Candidate;
 use tetdb_base::geom::Point;
 
 /// Points inserted that are compared with the next one before anything else is done about it. They refuse three in five of what is too near
@@ -8,8 +7,8 @@ use tetdb_base::geom::Point;
 const RECENT: usize = 32;
 
 /// The last points inserted. Candidates come along the curve, so what refuses one is often among them, and else the nearest of
-/// them is a good place to start the walk: comparing costs a fiftieth of walking from the divided edge, which is long gone.
-pub(crate) struct Recent {
+/// them is a good place to start the walk: comparing costs a fiftieth of walking from the tetrahedron that wanted it, which is long gone.
+pub(super) struct Recent {
     points: [(Point, f32); RECENT],
     /// A tetrahedron of each.
     tets: [u32; RECENT],
@@ -60,15 +59,5 @@ impl Recent {
     }
 }
 
-/// Square of the distance, in units of h, below which a point just inserted is a better place to start than the divided edge.
+/// Square of the distance, in units of h, below which a point just inserted is a better place to start than where it is wanted.
 const NEAR_START: f64 = 4.0;
-
-/// Least distance to a vertex, in units of the mean of both wanted lengths.
-const FILTER: f64 = std::f64::consts::FRAC_1_SQRT_2;
-
-/// Whether a vertex of size `h` at the square root of a distance is too near to the candidate.
-#[inline(always)]
-pub(super) fn refuses(squared: f64, h: f32, c: &Candidate) -> bool {
-    let least = FILTER * 0.5 * (f64::from(h) + f64::from(c.h));
-    squared < least * least
-}
