@@ -22,7 +22,7 @@ const HOUSE: &[(&str, &[&[&str]])] = &[
         &[
             &["mesh", "topology"],
             &["delaunay", "reconnect", "sizing", "samples"],
-            &["boundary", "refine", "optimize"],
+            &["boundary", "optimize"],
             &["blocks"],
             &["bisect"],
         ],
@@ -67,7 +67,6 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "engine/pipeline/tasks/serve.rs serve",
         "what orders need is set up once and lent to the threads that do them",
     ),
-    ("kernel/refine/long_edges.rs divide", "one edge from its length to its points"),
 ];
 
 #[test]

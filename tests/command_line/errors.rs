@@ -213,7 +213,7 @@ const CASES: &[Case] = &[
         "no-room",
         6,
         "mesh sample:box,h=0.5 --size-sphere 0.5,0.5,0.5,0.2,0.0001 -o x.tetdb",
-        "3.4",
+        "3.5",
     ),
     Case {
         word: "io",

@@ -41,7 +41,7 @@ fn estimates_come_true() {
         "sample:box,h=0.1",
         "sample:box,h=0.2 --hsiz 0.05 --optimize none",
         "sample:balls,count=3",
-        "sample:knot,h=0.2",
+        "sample:knot,h=0.15",
         "sample:shells,count=3,h=0.2 --regions all",
         "sample:box,h=0.2 --size-sphere 0.5,0.5,0.5,0.2,0.02",
         "sample:box,h=0.2 --size-expr 0.03+0.3*abs(x-0.5)",

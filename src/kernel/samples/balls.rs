@@ -1,4 +1,4 @@
-//! A unit cube with spherical inclusions: the paper's case 5.
+//! A unit cube with inclusions: balls, the paper's case 5, or ellipsoids in their place.
 
 use super::SampleError;
 use super::boxes::{box_triangles, push_box};
@@ -28,13 +28,18 @@ const DRAWS_FULL: u32 = 3;
 const DRAWS_MAX: u32 = 30;
 const SHRINK: f64 = 0.95;
 
-/// Parameters of `balls,count=…,seed=…,h=…`.
+/// Semi-axes of an ellipsoid, in units of the ball's radius that it replaces. Their edges are as much shorter.
+pub(super) const ELLIPSOID: Point = Point::new(1.0, 0.75, 0.5);
+
+/// Parameters of `balls,count=…,seed=…,h=…` and of `ellipsoids` with the same.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Balls {
     pub count: usize,
     pub seed: u64,
     /// Edge length; by default it follows the balls' size.
     pub h: f64,
+    /// Semi-axes in units of a ball's radius.
+    pub axes: Point,
 }
 
 impl Balls {
@@ -43,12 +48,17 @@ impl Balls {
         cube_root(1000.0 / count as f64)
     }
 
+    /// What they are called in a sample's word and as a label.
+    pub(super) fn name(&self) -> &'static str {
+        if self.axes == Point::ONE { "balls" } else { "ellipsoids" }
+    }
+
     /// The edge length for that many balls when none is given.
     pub(super) fn h_default(count: usize) -> f64 {
         H_DEFAULT * Self::scale(count)
     }
 
-    /// Builds the surface: labels `walls` and `balls`.
+    /// Builds the surface: labels `walls` and `balls`, or `ellipsoids`.
     pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let mut random = Random::new(self.seed);
         let placed = self.place(&mut random)?;
@@ -59,11 +69,11 @@ impl Balls {
         triangles_checked("balls", n_triangles, bytes_max)?;
         let mut build = Builder::default();
         let walls = build.label("walls");
-        let label = build.label("balls");
+        let label = build.label(self.name());
         push_box(&mut build, &bounds, self.h, false, [walls; 6]);
         let mut spheres = Spheres::default();
         for (center, radius) in placed {
-            let ball = Ball::turned(center, radius, &mut random);
+            let ball = Ball::turned(center, radius, self.axes, &mut random);
             spheres.push(&mut build, &ball, self.h, true, label);
         }
         Ok(build.finish())

@@ -1,6 +1,6 @@
 //! Parses a word such as `balls,count=1000,h=0.02`.
 
-use super::balls::Balls;
+use super::balls::{Balls, ELLIPSOID};
 use super::broken::{Broken, BrokenKind};
 use super::caps::Caps;
 use super::faults::Faults;
@@ -18,8 +18,19 @@ use tetdb_base::geom::Point;
 pub const PREFIX: &str = "sample:";
 /// The samples there are.
 pub const SAMPLES: &[&str] = &[
-    "balls", "box", "broken", "caps", "faults", "grains", "knot", "needles", "shells", "sphere",
-    "steps", "wells",
+    "balls",
+    "box",
+    "broken",
+    "caps",
+    "ellipsoids",
+    "faults",
+    "grains",
+    "knot",
+    "needles",
+    "shells",
+    "sphere",
+    "steps",
+    "wells",
 ];
 
 /// The specification of a sample.
@@ -31,7 +42,7 @@ pub struct SampleSpec {
 /// The generators and their parameters; lengths in the sample's own units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SampleKind {
-    /// Balls inside a box.
+    /// Balls or ellipsoids inside a box.
     Balls(Balls),
     /// A box.
     Box {
@@ -88,7 +99,8 @@ impl SampleSpec {
         let text = text.strip_prefix(PREFIX).unwrap_or(text);
         let (name, rest) = text.split_once(',').unwrap_or((text, ""));
         let kind = match name {
-            "balls" => parse_balls(rest)?,
+            "balls" => parse_balls("balls", Point::ONE, rest)?,
+            "ellipsoids" => parse_balls("ellipsoids", ELLIPSOID, rest)?,
             "box" => parse_box(rest)?,
             "broken" => parse_broken(rest)?,
             "caps" => parse_caps(rest)?,
@@ -120,8 +132,8 @@ impl SampleSpec {
     /// The word with every key spelled out: equal words make equal surfaces.
     pub fn canonical(&self) -> String {
         match &self.kind {
-            SampleKind::Balls(Balls { count, seed, h }) => {
-                format!("{PREFIX}balls,count={count},seed={seed},h={h}")
+            SampleKind::Balls(balls @ Balls { count, seed, h, .. }) => {
+                format!("{PREFIX}{},count={count},seed={seed},h={h}", balls.name())
             }
             SampleKind::Box { sides, h } => {
                 format!("{PREFIX}box,x={},y={},z={},h={h}", sides.x, sides.y, sides.z)
@@ -192,12 +204,12 @@ impl SampleSpec {
     }
 }
 
-fn parse_balls(rest: &str) -> Result<SampleKind, SampleError> {
-    let keys = Keys::new("balls", &["count", "seed", "h"], rest)?;
+fn parse_balls(kind: &'static str, axes: Point, rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new(kind, &["count", "seed", "h"], rest)?;
     let count = keys.number("count", 100, 1, 10_000_000)?;
     let seed = keys.number("seed", 1, 0, u64::MAX)?;
     let h = keys.length("h", Balls::h_default(count))?;
-    Ok(SampleKind::Balls(Balls { count, seed, h }))
+    Ok(SampleKind::Balls(Balls { count, seed, h, axes }))
 }
 
 fn parse_box(rest: &str) -> Result<SampleKind, SampleError> {

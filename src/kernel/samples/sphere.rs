@@ -42,10 +42,13 @@ pub(super) fn sphere_triangles(pieces: f64) -> f64 {
     20.0 * pieces * pieces
 }
 
-/// A sphere's place and turn.
+/// The place and turn of a sphere or an ellipsoid.
 pub(super) struct Ball {
     pub center: Point,
+    /// Longest semi-axis.
     pub radius: f64,
+    /// Semi-axes in units of the radius.
+    pub axes: Point,
     /// Columns of a rotation.
     pub turn: [Point; 3],
 }
@@ -53,13 +56,13 @@ pub(super) struct Ball {
 impl Ball {
     /// Around the origin, not turned.
     pub fn unturned(radius: f64) -> Self {
-        Self { center: Point::ZERO, radius, turn: [Point::X, Point::Y, Point::Z] }
+        Self { center: Point::ZERO, radius, axes: Point::ONE, turn: [Point::X, Point::Y, Point::Z] }
     }
 
     /// Turned at random, so that many balls do not share directions.
-    pub fn turned(center: Point, radius: f64, random: &mut Random) -> Self {
+    pub fn turned(center: Point, radius: f64, axes: Point, random: &mut Random) -> Self {
         let turn = random.rotation();
-        Self { center, radius, turn }
+        Self { center, radius, axes, turn }
     }
 }
 
@@ -77,6 +80,7 @@ impl Spheres {
         let [x, y, z] = ball.turn;
         let ids: Vec<u32> = points
             .iter()
+            .map(|&p| p * ball.axes)
             .map(|p| build.point(ball.center + (x * p.x + y * p.y + z * p.z) * ball.radius))
             .collect();
         for t in triangles {

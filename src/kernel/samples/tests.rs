@@ -98,6 +98,9 @@ fn balls_keep_their_gaps() {
     assert_eq!(check_closed(&sample), 2 * 61);
     let volume = sample.signed_volume();
     assert!(volume > 0.55 && volume < 0.7, "{volume}");
+    // An ellipsoid has 3/8 of its ball.
+    let inner = made("ellipsoids,count=60,seed=3,h=0.06").signed_volume();
+    assert!((1.0 - inner - 0.375 * (1.0 - volume)).abs() < 1e-9, "{inner}");
     // Balls are 61 connected parts; points of two parts are never nearer than the gap.
     let gap = 0.006 * (1000.0f64 / 60.0).cbrt();
     let part = parts(&sample);
@@ -278,6 +281,7 @@ fn the_same_word_gives_the_same_bits() {
     assert_eq!(found, EXPECTED, "{found:#x?}");
     for text in [
         "balls,count=20",
+        "ellipsoids,count=20",
         "box,x=0.3",
         "grains,count=20",
         "knot",
