@@ -113,7 +113,7 @@ pub struct ShapeArgs {
     /// How finished sub-domains are kept [default: packed]
     #[arg(long, value_name = "HOW", value_parser = word_of::<Seal>(SEAL), help_heading = "Store")]
     pub seal: Option<Seal>,
-    /// Number of sub-domains: auto, or a number [default: auto, one up to 2 million tetrahedra, above one for each 5 million, of large meshes 10 million]
+    /// Number of sub-domains: auto, or a number [default: auto, one for each 10 million tetrahedra]
     #[arg(long, value_name = "N", alias = "domains", help_heading = "Store")]
     pub subdomains: Option<String>,
     /// Keep the meshes before and after refinement for each cut, and its interface before and after faces are chosen, for `tetdb snapshot --stage`

@@ -87,7 +87,7 @@ def mesh(
     optimize : {"full", "delaunay", "none"}
         How far tetrahedra are improved.
     subdomains : int, optional
-        How many. Default: one up to two million tetrahedra, above one for each five million, of large meshes ten million.
+        How many. Default: one for each ten million tetrahedra.
     memory : int or str, optional
         Bytes the run may hold, or text such as ``"8GiB"``. Default: 60 % of what is free.
     threads : int, optional
