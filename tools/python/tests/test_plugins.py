@@ -1,0 +1,41 @@
+"""Packages that find tetdb by themselves, or after one import."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tetdb
+
+
+def test_pyvista_reads_stores(parts: tetdb.Store) -> None:
+    pyvista = pytest.importorskip("pyvista", minversion="0.48")
+    grid = pyvista.read(parts.path)
+    assert grid.n_cells == parts.n_tets
+    assert set(np.unique(grid.cell_data["subdomain"])) == {0, 1}
+    assert grid.volume == pytest.approx(1.0)
+    with pytest.raises(FileNotFoundError):
+        pyvista.read(str(Path(parts.path).parent / "none.tetdb"))
+
+
+def test_pyvista_surfaces_are_meshed(tmp_path: Path) -> None:
+    pyvista = pytest.importorskip("pyvista", minversion="0.48")
+    ball = pyvista.Icosphere(nsub=2)
+    assert ball.tetdb.check().ok
+    grid = ball.tetdb.tetrahedralize(hsiz=0.2)
+    assert grid.volume == pytest.approx(ball.volume) and set(grid.celltypes) == {pyvista.CellType.TETRA}
+    with ball.tetdb.mesh(tmp_path / "ball.tetdb", hsiz=0.2) as store:
+        assert store.n_tets == grid.n_cells
+    with pytest.raises(tetdb.SurfaceError):
+        ball.extract_cells(range(10)).extract_surface().tetdb.tetrahedralize()
+
+
+def test_meshio_reads_stores(parts: tetdb.Store) -> None:
+    meshio = pytest.importorskip("meshio")
+    pytest.importorskip("tetdb.meshio")
+    mesh = meshio.read(parts.path)
+    merged = parts.merged()
+    assert np.array_equal(mesh.cells_dict["tetra"], merged.tets) and np.array_equal(mesh.points, merged.points)
+    assert np.array_equal(mesh.cell_data["region"][0], merged.regions)
