@@ -96,6 +96,7 @@ pub struct CheckArgs {
   box     x, y, z, h          sides of a box
   broken  kind, count, seed, h  kind is holes, crossings, doubled, cracks, turned, tjunctions or soup
   caps    count, seed         a column with flat ends of many corners, badly cut into triangles
+  ellipsoids  count, seed, h  as balls, with ellipsoids in place of them
   faults  count, seed, cells, shift  a box with sheets in it that cut each other and end inside
   grains  count, seed, h      disjoint convex polyhedra in a box; mesh them with --regions all
   knot    tube, h             a knotted tube
@@ -107,7 +108,7 @@ pub struct CheckArgs {
 h is the length of the edges."
 )]
 pub struct SampleArgs {
-    /// NAME,key=value,... with the names balls, box, broken, caps, faults, grains, knot, needles, shells, sphere, steps, wells
+    /// NAME,key=value,... with the names balls, box, broken, caps, ellipsoids, faults, grains, knot, needles, shells, sphere, steps, wells
     #[arg(value_name = "SAMPLE")]
     pub sample: String,
     /// The file to write: .stl (text), .off, .obj or .ply, all exact; - is the standard output
