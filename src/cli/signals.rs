@@ -5,9 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::time::Duration;
 use tetdb_engine::api::CancelToken;
 
-use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGABRT, SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_shutdown;
-use signal_hook::iterator::Signals;
 
 static RECEIVED: AtomicI32 = AtomicI32::new(0);
 /// True if a store exists that can be resumed.
@@ -34,16 +33,12 @@ const NO_MEMORY: i32 = 6;
 ///
 /// Errors: the system refuses; the run then cannot be cancelled by signals.
 pub fn listen(cancel: &CancelToken, last: impl Fn() -> u8 + Send + Sync + 'static) {
-    let mut which = vec![SIGINT, SIGTERM];
-    if !is_ignored(SIGHUP) {
-        which.push(SIGHUP);
-    }
-    let Ok(mut signals) = Signals::new(which) else {
+    let Some(signals) = incoming() else {
         return;
     };
     let (token, last) = (cancel.clone(), Arc::new(last));
     std::thread::spawn(move || {
-        for signal in signals.forever() {
+        for signal in signals {
             if RECEIVED.swap(signal, Ordering::Relaxed) != 0 {
                 std::process::exit(128 + signal);
             }
@@ -59,12 +54,45 @@ pub fn listen(cancel: &CancelToken, last: impl Fn() -> u8 + Send + Sync + 'stati
     });
 }
 
+/// The signals that end a run, as they come; none if the system refuses.
+#[cfg(unix)]
+fn incoming() -> Option<impl Iterator<Item = i32>> {
+    use signal_hook::consts::SIGHUP;
+    let mut which = vec![SIGINT, SIGTERM];
+    if !is_ignored(SIGHUP) {
+        which.push(SIGHUP);
+    }
+    let mut signals = signal_hook::iterator::Signals::new(which).ok()?;
+    Some(std::iter::from_fn(move || signals.forever().next()))
+}
+
 /// Returns whether the process was started with a signal ignored, as by `nohup` for SIGHUP. Also true if the system does not report it.
+#[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|l| l.strip_prefix("SigIgn:"));
     let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
     mask.is_none_or(|mask| mask >> (signal - 1) & 1 != 0)
+}
+
+/// Like above, for systems without a queue of signals: looks 20 times a second.
+#[cfg(not(unix))]
+fn incoming() -> Option<impl Iterator<Item = i32>> {
+    use signal_hook::flag::register_usize;
+    use std::sync::atomic::AtomicUsize;
+    let last = Arc::new(AtomicUsize::new(0));
+    for signal in [SIGINT, SIGTERM] {
+        register_usize(signal, last.clone(), signal as usize).ok()?;
+    }
+    Some(std::iter::from_fn(move || {
+        loop {
+            std::thread::sleep(Duration::from_millis(50));
+            let signal = last.swap(0, Ordering::Relaxed);
+            if signal != 0 {
+                return Some(signal as i32);
+            }
+        }
+    }))
 }
 
 /// Announces that a store exists. A step in progress then ends in order, however long it takes.
