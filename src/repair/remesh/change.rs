@@ -29,7 +29,7 @@ pub struct Remesher<'a> {
     /// Kept curves.
     pub chains: Vec<Chain>,
     /// The wanted lengths.
-    pub sizes: Sizes,
+    pub sizes: Sizes<'a>,
     /// What was asked for.
     pub settings: &'a RemeshSettings,
     /// Counts so far.

@@ -49,7 +49,7 @@ const FACET: f64 = 2.0;
 
 /// Remeshes a valid surface without sheets or embedded parts.
 ///
-/// The result is the same for any number of threads. Memory: `scratch` for the tree of the input, and about 400 bytes for each triangle
+/// Lengths are at most `most` of their place. The result is the same for any number of threads. Memory: `scratch` for the tree of the input, and about 400 bytes for each triangle
 /// that there ever is. A cancelled run unwinds ([`attempt`](tetdb_base::storage::attempt)).
 ///
 /// # Errors
@@ -57,6 +57,7 @@ const FACET: f64 = 2.0;
 pub fn remesh(
     surface: &Surface,
     settings: &RemeshSettings,
+    most: &dyn Fn(Point) -> f64,
     scratch: &ScratchSpace,
     progress: &dyn Fn(f64),
 ) -> Result<(Surface, RemeshReport), SurfaceError> {
@@ -86,7 +87,7 @@ pub fn remesh(
     // A hair less than asked for: coordinates are rounded.
     let envelope = Envelope::new(&plain, settings.tolerance * (1.0 - 1e-6), scratch);
     let sources = sources::sources(&mesh, &chains, &envelope, &settings, scratch);
-    let sizes = Sizes::new(sources, settings.growth, [settings.hmin, settings.hmax], scratch);
+    let sizes = Sizes::new(sources, settings.growth, [settings.hmin, settings.hmax], most, scratch);
     let mut octree = Octree::new(plain.bounds());
     for t in 0..mesh.triangles.len() as u32 {
         octree.insert(t, Aabb::around(mesh.corners(t)));
