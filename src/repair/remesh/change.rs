@@ -5,6 +5,7 @@ use tetdb_base::surface::contact;
 
 use super::chains::Chain;
 use super::envelope::{Envelope, box_around};
+use super::history::History;
 use super::mesh::{EdgeKey, Mesh, Span, area_normal, cosine, edge, quality};
 use super::octree::Octree;
 use super::region::{Region, is_covered};
@@ -34,6 +35,8 @@ pub struct Remesher<'a> {
     pub settings: &'a RemeshSettings,
     /// Counts so far.
     pub report: RemeshReport,
+    /// Changes and failures so far.
+    pub history: History,
 }
 
 /// A replacement of triangles.
@@ -80,9 +83,26 @@ impl Remesher<'_> {
 
     /// Applies a change if every check allows it.
     pub fn apply(&mut self, change: &Change) -> bool {
-        if !self.is_allowed(change) {
-            return false;
+        let is_allowed = self.is_allowed(change);
+        if is_allowed {
+            self.commit(change);
         }
+        is_allowed
+    }
+
+    /// Everything that the checks of a change depend on lies in this box, or has a corner in it.
+    pub fn reach(&self, change: &Change) -> Aabb {
+        let old = change.removed.iter().flat_map(|&t| self.mesh.corners(t));
+        let Aabb { low, high } =
+            Aabb::around(old.chain(self.corners_added(change).into_iter().flatten()));
+        let by = Point::splat(2.0 * self.envelope.tolerance);
+        Aabb { low: low - by, high: high + by }
+    }
+
+    /// Applies a change that is allowed.
+    pub fn commit(&mut self, change: &Change) {
+        let old = change.removed.iter().flat_map(|&t| self.mesh.triangles[t as usize]);
+        self.history.change(old.chain(change.added.iter().flat_map(|(t, _)| *t)));
         let mesh = &mut self.mesh;
         for &t in &change.removed {
             self.octree.remove(t);
@@ -104,10 +124,10 @@ impl Remesher<'_> {
             let t = mesh.add(t, label);
             self.octree.insert(t, Aabb::around(mesh.corners(t)));
         }
-        true
     }
 
-    fn is_allowed(&self, change: &Change) -> bool {
+    /// Returns whether every check allows a change.
+    pub fn is_allowed(&self, change: &Change) -> bool {
         let corners = self.corners_added(change);
         if !corners.iter().all(|t| quality(*t) > 1e-9) || !self.keeps_labels(change) {
             return false;
@@ -139,7 +159,8 @@ impl Remesher<'_> {
             .all(|t| t.into_iter().all(is_in_plane) && area_normal(t).dot(normal) > 0.0)
     }
 
-    fn keeps_labels(&self, change: &Change) -> bool {
+    /// Returns whether each label keeps a triangle.
+    pub fn keeps_labels(&self, change: &Change) -> bool {
         change.removed.iter().all(|&t| {
             let label = self.mesh.labels[t as usize];
             let n = |all: usize| all as u32;

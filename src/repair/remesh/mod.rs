@@ -6,13 +6,14 @@
 //! curves (`chains`) stay within the tolerance of their own input; corners stay where they are.
 //!
 //! Reading order: `settings`, `region` (convex sets around a triangle), `envelope` (the distance bound), `octree`, `mesh`, `chains`, `sizes` and
-//! `sources` (wanted lengths), `change` (one replacement and its checks), `operations`, `passes`.
+//! `sources` (wanted lengths), `change` (one replacement and its checks), `history` (what failed before), `operations`, `passes`.
 //!
 //! Is not: repair. The input must be valid.
 
 mod chains;
 mod change;
 mod envelope;
+mod history;
 mod mesh;
 mod octree;
 mod operations;
@@ -57,7 +58,7 @@ const FACET: f64 = 2.0;
 pub fn remesh(
     surface: &Surface,
     settings: &RemeshSettings,
-    most: &dyn Fn(Point) -> f64,
+    most: &(dyn Fn(Point) -> f64 + Sync),
     scratch: &ScratchSpace,
     progress: &dyn Fn(f64),
 ) -> Result<(Surface, RemeshReport), SurfaceError> {
@@ -101,8 +102,17 @@ pub fn remesh(
         corners: mesh.kinds.iter().filter(|k| **k == mesh::VertexKind::Corner).count() as u64,
         ..RemeshReport::default()
     };
-    let mut remesher =
-        Remesher { mesh, wanted, octree, envelope, chains, sizes, settings: &settings, report };
+    let mut remesher = Remesher {
+        mesh,
+        wanted,
+        octree,
+        envelope,
+        chains,
+        sizes,
+        settings: &settings,
+        report,
+        history: history::History::default(),
+    };
     if !remesher.run(triangles_max, progress) {
         return Err(too_many(triangles_max as u64, bytes_max));
     }

@@ -19,7 +19,7 @@ pub struct Sizes<'a> {
     least: f64,
     most: f64,
     /// The most at a place.
-    most_at: &'a dyn Fn(Point) -> f64,
+    most_at: &'a (dyn Fn(Point) -> f64 + Sync),
 }
 
 impl<'a> Sizes<'a> {
@@ -28,7 +28,7 @@ impl<'a> Sizes<'a> {
         sources: Vec<Source>,
         growth: f64,
         [least, most]: [f64; 2],
-        most_at: &'a dyn Fn(Point) -> f64,
+        most_at: &'a (dyn Fn(Point) -> f64 + Sync),
         scratch: &ScratchSpace,
     ) -> Self {
         let sources = thinned(sources);
