@@ -4,7 +4,7 @@ use tetdb_base::geom::{Aabb, Point, orient};
 use tetdb_base::surface::contact;
 
 use super::chains::Chain;
-use super::envelope::{Envelope, box_around};
+use super::envelope::Envelope;
 use super::history::History;
 use super::mesh::{EdgeKey, Mesh, Span, area_normal, cosine, edge, quality};
 use super::octree::Octree;
@@ -262,26 +262,25 @@ impl Remesher<'_> {
         let tolerance = self.envelope.tolerance;
         let regions: Vec<Region> =
             corners.iter().filter_map(|t| Region::inner(*t, tolerance)).collect();
+        let mut open = Vec::new();
         for &t in &change.removed {
-            let old = self.mesh.corners(t);
-            let relying = self.envelope.relying(&old);
-            let open = relying.into_iter().filter(|part| !is_covered(part, &regions));
-            let open: Vec<_> = open.collect();
-            if open.is_empty() {
-                continue;
-            }
-            let mut all = regions.clone();
-            self.octree.meeting(&box_around(&old, 2.0 * tolerance), |s| {
-                if !change.removed.contains(&s) {
-                    all.extend(Region::inner(self.mesh.corners(s), tolerance));
-                }
-                false
-            });
-            if !open.iter().all(|part| is_covered(part, &all)) {
-                return false;
-            }
+            let relying = self.envelope.relying(&self.mesh.corners(t));
+            open.extend(relying.into_iter().filter(|part| !is_covered(part, &regions)));
         }
-        true
+        if open.is_empty() {
+            return true;
+        }
+        let mut all = regions;
+        let old = change.removed.iter().flat_map(|&t| self.mesh.corners(t));
+        let reach = Point::splat(2.0 * tolerance);
+        let Aabb { low, high } = Aabb::around(old);
+        self.octree.meeting(&Aabb { low: low - reach, high: high + reach }, |s| {
+            if !change.removed.contains(&s) {
+                all.extend(Region::inner(self.mesh.corners(s), tolerance));
+            }
+            false
+        });
+        open.iter().all(|part| is_covered(part, &all))
     }
 }
 
@@ -305,5 +304,21 @@ fn is_apart(p: &[Point; 3], p_ids: [u32; 3], q: &[Point; 3], q_ids: [u32; 3]) ->
                 })
         })
     };
-    by_edge(p, p_ids, q, q_ids) || by_edge(q, q_ids, p, p_ids)
+    // The corners of the one that are not the other's lie clearly on one side of the other's plane.
+    let by_plane = |p: &[Point; 3], p_ids: [u32; 3], q: &[Point; 3], q_ids: [u32; 3]| {
+        let normal = area_normal(*p);
+        let length = normal.length();
+        let side = |j: usize| {
+            let x = q[j] - p[0];
+            let d = normal.dot(x);
+            if d.abs() > CLEARLY * length * x.length() { d.signum() } else { 0.0 }
+        };
+        let mut sides = (0..3).filter(|&j| !p_ids.contains(&q_ids[j])).map(side);
+        let first = sides.next().unwrap_or(0.0);
+        first != 0.0 && sides.all(|s| s == first) && quality(*p) > NEEDLE
+    };
+    by_plane(p, p_ids, q, q_ids)
+        || by_plane(q, q_ids, p, p_ids)
+        || by_edge(p, p_ids, q, q_ids)
+        || by_edge(q, q_ids, p, p_ids)
 }
