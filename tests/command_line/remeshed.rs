@@ -105,9 +105,10 @@ fn a_mesh_that_begins_with_remeshing_is_resumed_and_verified() {
         answer["triangles"].as_u64().expect("a count")
     };
     let plain = size("--remesh-surface --hsiz 0.4");
-    assert!(size("--remesh-surface --hsiz 0.15") > 2 * plain);
-    assert!(size("--remesh-surface --hsiz 0.4 --size-sphere 1,0,0,0.5,0.05") > 2 * plain);
-    assert!(size("--remesh-surface --size-expr 0.1+0.1*z") > plain);
+    assert!(size("--remesh-surface --hsiz 0.1") > plain + plain / 2);
+    let sphere = "--size-sphere 1,0,0,0.5,0.05";
+    assert!(size(&format!("--remesh-surface --hsiz 0.4 {sphere}")) > plain + plain / 10);
+    assert!(size("--remesh-surface --size-expr 0.05+0.05*z") > 2 * plain);
     for (line, words) in [
         ("--remesh-tolerance 1%", "--remesh-surface"),
         ("--remesh-surface --remesh-tolerance 0", "tolerance"),
