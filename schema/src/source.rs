@@ -35,6 +35,8 @@ pub enum Origin {
     Welded(String),
     /// A closed surface around the triangles took their place; gap and offset. The fingerprint is that of the wrap.
     Wrapped(String),
+    /// The surface was remeshed within a tolerance; how, in words. The fingerprint is that of the remeshed surface.
+    Remeshed(String),
     /// All parts that are not closed are sheets.
     OpenParts,
     /// Embedded edges.
@@ -64,6 +66,7 @@ const RESOLVED: &str = "resolved:";
 const CLOSED: &str = "closed:";
 const WELDED: &str = "welded:";
 const WRAPPED: &str = "wrapped:";
+const REMESHED: &str = "remeshed:";
 const OPEN_PARTS: &str = "open-parts:";
 const EDGES: &str = "edges:";
 const POINTS: &str = "points:";
@@ -95,6 +98,8 @@ impl Source {
             Origin::Welded(rest.to_owned())
         } else if let Some(rest) = after(WRAPPED) {
             Origin::Wrapped(rest.to_owned())
+        } else if let Some(rest) = after(REMESHED) {
+            Origin::Remeshed(rest.to_owned())
         } else if let Some(rest) = after(SHEETS_FROM) {
             Origin::SheetsFrom(rest.parse().ok()?)
         } else if let Some(rest) = after(SHEET) {
@@ -126,6 +131,7 @@ impl Source {
             Origin::Closed(what) => format!("{CLOSED}{what}"),
             Origin::Welded(what) => format!("{WELDED}{what}"),
             Origin::Wrapped(what) => format!("{WRAPPED}{what}"),
+            Origin::Remeshed(what) => format!("{REMESHED}{what}"),
             Origin::OpenParts => OPEN_PARTS.to_owned(),
             Origin::Edges(file) => named(EDGES, file),
             Origin::Points(file) => named(POINTS, file),
@@ -147,9 +153,10 @@ impl Origin {
         }
     }
 
-    /// Returns whether it is a repair of the parts before it.
+    /// Returns whether it is a repair of the parts before it, or a remeshing.
     pub fn is_repair(&self) -> bool {
-        matches!(self, Self::Resolved(_) | Self::Closed(_) | Self::Welded(_) | Self::Wrapped(_))
+        use Origin::{Closed, Remeshed, Resolved, Welded, Wrapped};
+        matches!(self, Resolved(_) | Closed(_) | Welded(_) | Wrapped(_) | Remeshed(_))
     }
 
     /// Returns whether the part is inside the surface, and was added after its own triangles.
@@ -176,6 +183,7 @@ mod tests {
             "closed:holes=2,area=3e-1",
             "welded:share=1e-6,joined=4",
             "wrapped:gap=1e-2,offset=1e-3",
+            "remeshed:tolerance=1e-3,angle=40",
             "edges:well=/home/a/wells.obj",
             "points:sensor=/home/a/p.csv",
             "wires:12,3",

@@ -34,7 +34,7 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     let options = typed(config::inside_of(&args.inside))?;
     let mut surface = input::load_with(
         &args.surfaces,
-        &RepairArgs::default(),
+        (&RepairArgs::default(), None),
         &args.sheets,
         &options,
         &settings,

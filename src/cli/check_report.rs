@@ -211,7 +211,6 @@ impl Printed<'_> {
             ));
             return;
         }
-        // A wrap, for what cannot be closed, would be offered here.
         if let Some(done) = &self.report.resolving {
             let rest = match done.n_defects {
                 0 => String::new(),
@@ -223,6 +222,9 @@ impl Printed<'_> {
                 "help: `tetdb mesh {} --repair resolve{regions}` divides crossing triangles first: {} triangles divided, {} vertices added, none farther than {} from its exact place{rest}",
                 self.surfaces, done.divided, done.points_added, short(done.moved_most)
             ));
+            if done.n_defects > 0 {
+                self.print_wrap(console);
+            }
             return;
         }
         let help = if is_dropped(first) && !self.is_repaired {
@@ -234,6 +236,19 @@ impl Printed<'_> {
             first.help().to_owned()
         };
         console.line(&format!("help: {help}"));
+        if !all_dropped {
+            self.print_wrap(console);
+        }
+    }
+
+    /// Offers what works where nothing cheaper does.
+    fn print_wrap(&self, console: &Console) {
+        if self.surface.n_triangles() > 0 {
+            console.line(&format!(
+                "help: `tetdb mesh {} --repair wrap` puts a closed surface around all of it, at an offset; that was not tried",
+                self.surfaces
+            ));
+        }
     }
 }
 

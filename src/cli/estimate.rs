@@ -23,8 +23,14 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     // `cap` belongs to the planned run. The estimate itself needs the surface in memory, however large.
     let wide = console.settings(Some(cap.max(default_cap().0)), args.threads);
     let wide = input::scratch_beside(wide, store);
-    let surface =
-        input::load_with(&args.surfaces, &args.repair, &args.sheets, &options, &wide, console)?;
+    let surface = input::load_with(
+        &args.surfaces,
+        (&args.repair, Some(&args.remesh)),
+        &args.sheets,
+        &options,
+        &wide,
+        console,
+    )?;
     surface.validate_with(&wide)?;
     let found = Mesher::with_options(surface, options).settings(settings).predict_at(store)?;
     let (fits_memory, fits_disk) = (found.fits_memory, found.fits_disk());

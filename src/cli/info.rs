@@ -74,6 +74,7 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         (_, Some(("closed", what))) => format!("closed by winding numbers ({what})"),
         (_, Some(("welded", what))) => format!("near points joined ({what})"),
         (_, Some(("wrapped", what))) => format!("wrapped ({what})"),
+        (_, Some(("remeshed", what))) => format!("remeshed ({what})"),
         (path, _) => path.to_owned(),
     });
     let surfaces: Vec<String> = surfaces.collect();

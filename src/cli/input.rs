@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use super::args::{RepairArgs, SheetArgs, WrapLengths};
+use super::args::{RemeshArgs, RepairArgs, SheetArgs, WrapLengths};
 use super::console::Console;
 use super::failure::Failure;
 use super::words::count;
 use super::wrap;
 use tetdb_engine::api::{
-    Code, EmbeddedKind, MeshOptions, RepairKind, RepairStep, ResolveReport, Settings, Surface,
-    SurfaceWrap, SurfaceWritten,
+    Code, EmbeddedKind, Error, Length, MeshOptions, RepairKind, RepairStep, ResolveReport,
+    Settings, Surface, SurfaceRemesh, SurfaceWrap, SurfaceWritten,
 };
 
 /// The same settings, with temporary files in the folder of `file` or its nearest existing parent.
@@ -72,12 +72,30 @@ fn wrap_lengths(repair: &RepairArgs) -> Result<Option<SurfaceWrap>, Failure> {
     Ok(is_wrap.then_some(lengths))
 }
 
+/// Remeshes a surface before it is meshed with `options`.
+fn remeshed(
+    surface: &Surface,
+    args: &RemeshArgs,
+    options: &MeshOptions,
+    settings: &Settings,
+    console: &Console,
+) -> Result<Surface, Failure> {
+    let mut how = SurfaceRemesh::default().sized(&options.sizes);
+    if let Some(text) = &args.remesh_tolerance {
+        how.tolerance = Length::parse("tolerance", text).map_err(Error::from)?;
+    }
+    how.feature_angle = args.remesh_angle.unwrap_or(how.feature_angle);
+    let (even, report) = surface.remeshed_with(&how, settings)?;
+    console.note(&format!("note: remeshed: {}", report.in_words()));
+    Ok(even)
+}
+
 /// Reads files or generates a sample, and embeds sheets, edges and points.
 ///
 /// As `options` say, triangles are divided where edges and points lie on them, and points are moved there.
 pub fn load_with(
     arguments: &[String],
-    repair: &RepairArgs,
+    (repair, remesh): (&RepairArgs, Option<&RemeshArgs>),
     sheets: &SheetArgs,
     options: &MeshOptions,
     settings: &Settings,
@@ -105,6 +123,9 @@ pub fn load_with(
             None => surface.repaired_by(kind, settings)?,
         };
         note_repaired(&steps, console);
+    }
+    if let Some(args) = remesh.filter(|args| args.remesh_surface) {
+        surface = remeshed(&surface, args, options, settings, console)?;
     }
     if sheets.allow_open {
         let (with, n) = surface.open_parts_with(settings)?;

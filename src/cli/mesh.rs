@@ -34,7 +34,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     Mesher::check_path(&path, existing)?;
     let surface = input::load_with(
         &args.surfaces,
-        &args.repair,
+        (&args.repair, Some(&args.remesh)),
         &args.sheets,
         &options,
         &input::scratch_beside(settings.clone(), &path),

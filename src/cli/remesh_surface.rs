@@ -20,13 +20,9 @@ pub fn run(args: &RemeshSurfaceArgs, console: &Console) -> Result<u8, Failure> {
         ..OptionsText::default()
     };
     let sizes = sizes.sizes().map_err(Error::from)?;
-    let options = SurfaceRemesh {
-        tolerance: Length::parse("tolerance", &args.tolerance).map_err(Error::from)?,
-        feature_angle: args.feature_angle,
-        hmax: sizes.hsiz.or(sizes.hmax),
-        hmin: sizes.hmin,
-        hgrad: sizes.hgrad,
-    };
+    let mut options = SurfaceRemesh::default().sized(&sizes);
+    options.tolerance = Length::parse("tolerance", &args.tolerance).map_err(Error::from)?;
+    options.feature_angle = args.feature_angle;
     Surface::check_format(&args.output)?;
     if !args.force {
         check_target(&args.output, &[PathBuf::from(&args.surface)])

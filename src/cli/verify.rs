@@ -28,7 +28,7 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
             let options = MeshOptions::default();
             let mut surface = input::load_with(
                 &args.against,
-                &args.repair,
+                (&args.repair, None),
                 &args.sheets,
                 &options,
                 &settings,

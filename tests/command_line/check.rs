@@ -235,3 +235,19 @@ fn the_answer_has_its_fields() {
         ]
     );
 }
+
+#[test]
+fn a_wrap_is_named_where_nothing_cheaper_works() {
+    let place = Place::new();
+    place.run_line("sample broken,kind=soup,seed=3 -o soup.off").succeeds();
+    let one = cube_at(0.0, 0.0, 0.0);
+    place.write("two.off", off(&one[..2]));
+    place.write("one.off", off(&one[..1]));
+    for file in ["two.off", "one.off", "soup.off"] {
+        let said = place.run_line(&format!("check {file}"));
+        assert_eq!(said.exit(), Some(3), "{file}");
+        let named = said.stdout().contains(&format!("tetdb mesh {file} --repair wrap"));
+        let cheaper = said.stdout().contains("--repair winding");
+        assert!(named != cheaper, "{file}: {}", said.stdout());
+    }
+}

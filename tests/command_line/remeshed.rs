@@ -82,3 +82,59 @@ fn bad_options_and_bad_surfaces_are_refused_before_anything_is_written() {
     assert_eq!(refused.exit(), Some(6), "{}", refused.stderr());
     assert_eq!(refused.error()["code"], "memory");
 }
+
+#[test]
+fn a_mesh_that_begins_with_remeshing_is_resumed_and_verified() {
+    let place = Place::new();
+    place.write("rod.obj", cylinder(60));
+    let line = "mesh rod.obj --remesh-surface --remesh-tolerance 0.3% --hsiz 0.4";
+    let notes = place.run_line(&format!("{line} -o one.tetdb --threads 1")).succeeds().stderr();
+    assert!(notes.contains("remeshed: 236 triangles became"), "{notes}");
+    place.run_line(&format!("{line} -o two.tetdb --coarse-only")).succeeds();
+    place.run_line("resume two.tetdb --threads 2").succeeds();
+    assert_eq!(place.digest("one.tetdb"), place.digest("two.tetdb"));
+    place.run_line("verify two.tetdb --full").succeeds();
+    place.run_line("verify two.tetdb --against rod.obj").succeeds();
+    place.run_line("remesh-surface rod.obj even.obj --tolerance 0.3% --hsiz 0.4").succeeds();
+    place.run_line("mesh even.obj --hsiz 0.4 -o even.tetdb").succeeds();
+    assert_eq!(place.digest("one.tetdb"), place.digest("even.tetdb"));
+    let info = place.run_line("info two.tetdb").succeeds().stdout();
+    assert!(info.contains("remeshed (tolerance="), "{info}");
+    let size = |line: &str| {
+        let answer = place.run_line(&format!("estimate rod.obj {line} --json")).succeeds().json();
+        answer["triangles"].as_u64().expect("a count")
+    };
+    let plain = size("--remesh-surface --hsiz 0.4");
+    assert!(size("--remesh-surface --hsiz 0.1") > plain + plain / 2);
+    let sphere = "--size-sphere 1,0,0,0.5,0.05";
+    assert!(size(&format!("--remesh-surface --hsiz 0.4 {sphere}")) > plain + plain / 10);
+    assert!(size("--remesh-surface --size-expr 0.05+0.05*z") > 2 * plain);
+    for (line, words) in [
+        ("--remesh-tolerance 1%", "--remesh-surface"),
+        ("--remesh-surface --remesh-tolerance 0", "tolerance"),
+        ("--remesh-surface --remesh-angle 0", "feature angle"),
+    ] {
+        let refused = place.run_line(&format!("mesh rod.obj -o bad.tetdb {line}"));
+        assert_eq!(refused.exit(), Some(2), "{line}: {}", refused.stderr());
+        assert!(refused.stderr().contains(words), "{line}: {}", refused.stderr());
+    }
+}
+
+#[test]
+fn a_repaired_surface_is_remeshed_and_sizes_by_place_are_on_record() {
+    let place = Place::new();
+    place.run_line("sample broken,kind=holes,count=5 -o scan.stl").succeeds();
+    let line = "mesh scan.stl --repair auto --remesh-surface --remesh-tolerance 1%";
+    let line = format!("{line} --size-expr 0.2+0.1*abs(x) --size-box -1,-1,-1,0,0,0,0.1,0.5");
+    place.run_line(&format!("{line} -o a.tetdb")).succeeds();
+    place.run_line("verify a.tetdb --full").succeeds();
+    place.run_line("verify a.tetdb --against scan.stl").succeeds();
+    let info = place.run_line("info a.tetdb").succeeds().stdout();
+    let [closed, remeshed] = ["closed by", "remeshed ("].map(|words| info.find(words));
+    assert!(closed.is_some() && closed < remeshed, "{info}");
+    let file = std::fs::File::open(place.path("scan.stl")).expect("written");
+    let words: Vec<&str> = "mesh - --repair auto --remesh-surface -o b.tetdb".split(' ').collect();
+    let done = place.command(&words).stdin(file).output().expect("it runs");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    place.run_line("verify b.tetdb --full").succeeds();
+}

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::run::RunArgs;
-use super::{RepairArgs, ShapeArgs, SheetArgs};
+use super::{RemeshArgs, RepairArgs, ShapeArgs, SheetArgs};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -20,6 +20,8 @@ pub struct MeshArgs {
     pub output: Option<PathBuf>,
     #[command(flatten)]
     pub repair: RepairArgs,
+    #[command(flatten)]
+    pub remesh: RemeshArgs,
     #[command(flatten)]
     pub sheets: SheetArgs,
     #[command(flatten)]
@@ -51,6 +53,8 @@ pub struct EstimateArgs {
     pub output: Option<PathBuf>,
     #[command(flatten)]
     pub repair: RepairArgs,
+    #[command(flatten)]
+    pub remesh: RemeshArgs,
     #[command(flatten)]
     pub sheets: SheetArgs,
     #[command(flatten)]

@@ -21,8 +21,8 @@ pub use shape::{InsideArgs, ShapeArgs, SizeArgs};
 pub use show::{CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
 pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
 pub use surface::{
-    CheckArgs, RefineSurfaceArgs, RemeshSurfaceArgs, RepairArgs, SampleArgs, SheetArgs, WrapArgs,
-    WrapLengths,
+    CheckArgs, RefineSurfaceArgs, RemeshArgs, RemeshSurfaceArgs, RepairArgs, SampleArgs, SheetArgs,
+    WrapArgs, WrapLengths,
 };
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 

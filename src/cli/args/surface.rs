@@ -51,6 +51,21 @@ pub struct RepairArgs {
     pub wrap_offset: Option<String>,
 }
 
+/// A remeshing before anything is meshed.
+#[derive(Debug, clap::Args)]
+pub struct RemeshArgs {
+    /// Remesh the surface first, after any --repair: even triangles within a tolerance, as `tetdb remesh-surface` makes them, with the lengths of
+    /// --hsiz or --hmax, --hmin, --hgrad, the shapes and --size-expr
+    #[arg(long)]
+    pub remesh_surface: bool,
+    /// With --remesh-surface: greatest distance of either surface from the other [default: 0.05%]
+    #[arg(long, value_name = "DIST", allow_hyphen_values = true, requires = "remesh_surface")]
+    pub remesh_tolerance: Option<String>,
+    /// With --remesh-surface: edges that bend by more degrees than this are kept as curves [default: 40]
+    #[arg(long, value_name = "DEGREES", allow_hyphen_values = true, requires = "remesh_surface")]
+    pub remesh_angle: Option<f64>,
+}
+
 /// What is wrong with a surface, and what mesh it allows. Nothing is changed unless --repair is given.
 #[derive(Debug, clap::Args)]
 #[command(

@@ -12,7 +12,7 @@ use super::preflight::{self, preflight, scratch_beside, with_free_space};
 use super::store::say_how_locked;
 use super::{
     Bytes, EmbedOutside, Error, Event, Optimize, Regions, Seal, Settings, Sizes, Store, Subdomains,
-    Surface, Verification, guarded, job, replace, verify,
+    Surface, SurfaceRemesh, Verification, guarded, job, replace, verify,
 };
 use crate::pipeline::{self, MeshOptions, Options, PipelineError, Prepared, RECIPE};
 use tetdb_base::geom::{Point, count};
@@ -184,6 +184,15 @@ impl Mesher {
     pub fn refine_surface(mut self, refine: bool) -> Self {
         self.options.mesh.refine_surface = refine;
         self
+    }
+
+    /// Remeshes the surface within a tolerance, with the sizes and settings set so far; see [`Surface::remeshed`]. The store has it on record.
+    ///
+    /// Errors: those of [`Surface::remeshed`].
+    pub fn remesh_surface(mut self, how: SurfaceRemesh) -> Result<Self, Error> {
+        let how = how.with_sizes(&self.sizes)?;
+        (self.surface, _) = self.surface.remeshed_with(&how, &self.settings)?;
+        Ok(self)
     }
 
     /// Sets the treatment of embedded edges and points outside all filled regions. Default: an error.

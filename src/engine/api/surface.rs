@@ -463,6 +463,7 @@ impl Surface {
                 self.repaired_again(origin, scratch)
             }
             Origin::Wrapped(text) => self.wrapped_again(text, scratch),
+            Origin::Remeshed(text) => self.remeshed_again(text, scratch),
             Origin::OpenParts | Origin::File(_) | Origin::Sample(_) | Origin::Copy => {
                 Ok(self.open_parts_in(scratch)?.0)
             }

@@ -1,13 +1,15 @@
 //! Surfaces remeshed within a tolerance.
 
-use tetdb_base::storage::attempt;
+use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface::Surface as Inner;
 use tetdb_kernel::sizing::SizeOptions;
 use tetdb_repair::remesh::{RemeshReport, RemeshSettings, remesh};
 use tetdb_schema::code::Code;
 
+use tetdb_schema::source::Origin;
+
 use super::surface::refuse_sheets;
-use super::{Error, Length, Settings, Surface, guarded};
+use super::{Error, Length, OptionsText, Settings, Sizes, Surface, guarded};
 
 /// Greatest tolerance as a share of the box diagonal: beyond it two sides of most parts are as near as the tolerance.
 const TOLERANCE_MOST: f64 = 0.1;
@@ -31,6 +33,8 @@ pub struct SurfaceRemesh {
     pub hmin: Option<Length>,
     /// Greatest ratio of neighboring edge lengths. Default: 1.4.
     pub hgrad: Option<f64>,
+    /// Lengths in shapes, and a formula for them.
+    places: SizeOptions,
 }
 
 impl Default for SurfaceRemesh {
@@ -41,11 +45,28 @@ impl Default for SurfaceRemesh {
             hmax: None,
             hmin: None,
             hgrad: None,
+            places: SizeOptions::default(),
         }
     }
 }
 
 impl SurfaceRemesh {
+    /// Takes wanted lengths from the sizes of a mesh: `hsiz` or else `hmax`, `hmin`, `hgrad`, shapes and the expression. Lengths of regions and of
+    /// labels, and those of a size field, shape the inside alone.
+    pub fn with_sizes(self, sizes: &Sizes) -> Result<Self, Error> {
+        Ok(self.sized(&sizes.options()?))
+    }
+
+    /// [`SurfaceRemesh::with_sizes`] for sizes as options.
+    #[doc(hidden)]
+    pub fn sized(mut self, sizes: &SizeOptions) -> Self {
+        (self.hmax, self.hmin, self.hgrad) = (sizes.hsiz.or(sizes.hmax), sizes.hmin, sizes.hgrad);
+        self.places.sources.clone_from(&sizes.sources);
+        self.places.formula.clone_from(&sizes.formula);
+        self.places.hgrad = sizes.hgrad;
+        self
+    }
+
     /// The settings for one surface, in its units.
     fn settings(&self, surface: &Inner) -> Result<RemeshSettings, Error> {
         self.tolerance.check("tolerance")?;
@@ -53,7 +74,7 @@ impl SurfaceRemesh {
             hmax: self.hmax,
             hmin: self.hmin,
             hgrad: self.hgrad,
-            ..SizeOptions::default()
+            ..self.places.clone()
         };
         sizes.check()?;
         let bounds = surface.bounds();
@@ -124,10 +145,68 @@ impl Surface {
             let progress = |share: f64| {
                 settings.count("remesh", (share * STEPS as f64) as u64, STEPS, "steps");
             };
-            let (inner, report) = attempt(|| remesh(&self.inner, &wanted, &scratch, &progress))??;
-            let even = Self::given(inner);
+            self.remeshed_in(&wanted, options.feature_angle, &options.places, &scratch, &progress)
+        })
+        .and_then(|(even, report)| {
             even.validate_with(settings)?;
             Ok((even, report))
         })
+    }
+
+    /// Remeshes a surface, and puts that on record.
+    fn remeshed_in(
+        &self,
+        wanted: &RemeshSettings,
+        angle: f64,
+        places: &SizeOptions,
+        scratch: &ScratchSpace,
+        progress: &dyn Fn(f64),
+    ) -> Result<(Self, RemeshReport), Error> {
+        let diagonal = self.inner.bounds().diagonal();
+        let most = |p| places.at_place(p, diagonal);
+        let remesh = || remesh(&self.inner, wanted, &most, scratch, progress);
+        let (mut inner, report) = attempt(remesh)??;
+        inner.notes.clone_from(&self.inner.notes);
+        let RemeshSettings { tolerance, hmax, hmin, growth, .. } = *wanted;
+        let mut text = format!(
+            "tolerance={tolerance:e},angle={angle},hmax={hmax:e},hmin={hmin:e},growth={growth:e}"
+        );
+        if !places.sources.is_empty() || places.formula.is_some() {
+            let places = OptionsText::from_sizes(places, None);
+            text += &format!(",places={}", serde_json::json!(places));
+        }
+        let mut even = Self { inner, ..self.clone() };
+        even.turned = 0;
+        even.record(Origin::Remeshed(text));
+        Ok((even, report))
+    }
+
+    /// Remeshes again as the record says; the copy in a store is remeshed already.
+    pub(super) fn remeshed_again(
+        mut self,
+        text: &str,
+        scratch: &ScratchSpace,
+    ) -> Result<Self, Error> {
+        if self.sources.iter().any(|s| s.origin == Origin::Copy) {
+            self.record(Origin::Remeshed(text.to_owned()));
+            return Ok(self);
+        }
+        let damaged = || Error::new(Code::Damaged, "the record of the remeshing cannot be read");
+        let (numbers, places) = text.split_once(",places=").unwrap_or((text, "{}"));
+        let number = |key: &str| -> Result<f64, Error> {
+            let mut pairs = numbers.split(',').filter_map(|pair| pair.split_once('='));
+            let value = pairs.find(|(k, _)| *k == key).and_then(|(_, value)| value.parse().ok());
+            value.ok_or_else(damaged)
+        };
+        let places: OptionsText = serde_json::from_str(places).map_err(|_| damaged())?;
+        let wanted = RemeshSettings {
+            tolerance: number("tolerance")?,
+            feature_cos: number("angle")?.to_radians().cos(),
+            hmax: number("hmax")?,
+            hmin: number("hmin")?,
+            growth: number("growth")?,
+        };
+        let places = places.sizes()?;
+        Ok(self.remeshed_in(&wanted, number("angle")?, &places, scratch, &|_| ())?.0)
     }
 }

@@ -4,10 +4,12 @@ use std::fmt;
 
 use super::SizingError;
 use super::closed::slope_of_gradation;
+use super::constraint::SizeConstraint as _;
 use super::formula::Formula;
 use super::label::LabelSize;
 use super::length::Length;
 use super::sources::SizeSource;
+use tetdb_base::geom::Point;
 
 /// A size for one region, as asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -141,6 +143,13 @@ impl SizeOptions {
     /// Slope bound next to needles.
     pub(super) fn beta_needles(&self) -> f64 {
         slope_of_gradation(self.hgrad.unwrap_or(GRADATION_NEEDLES))
+    }
+
+    /// The size that shapes and the formula ask for at a place, for a box of that diagonal; infinite where they ask for none.
+    pub fn at_place(&self, p: Point, diagonal: f64) -> f64 {
+        let of_formula = self.formula.as_ref().and_then(|formula| formula.h(p).ok());
+        let shapes = self.sources.iter().map(|s| s.resolve(diagonal, 0.0).h(p, self.beta()));
+        shapes.chain(of_formula).fold(f64::INFINITY, f64::min)
     }
 
     /// Lengths for a box of that diagonal, checked together.

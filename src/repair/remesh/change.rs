@@ -4,7 +4,8 @@ use tetdb_base::geom::{Aabb, Point, orient};
 use tetdb_base::surface::contact;
 
 use super::chains::Chain;
-use super::envelope::{Envelope, box_around};
+use super::envelope::Envelope;
+use super::history::History;
 use super::mesh::{EdgeKey, Mesh, Span, area_normal, cosine, edge, quality};
 use super::octree::Octree;
 use super::region::{Region, is_covered};
@@ -29,11 +30,13 @@ pub struct Remesher<'a> {
     /// Kept curves.
     pub chains: Vec<Chain>,
     /// The wanted lengths.
-    pub sizes: Sizes,
+    pub sizes: Sizes<'a>,
     /// What was asked for.
     pub settings: &'a RemeshSettings,
     /// Counts so far.
     pub report: RemeshReport,
+    /// Changes and failures so far.
+    pub history: History,
 }
 
 /// A replacement of triangles.
@@ -80,9 +83,26 @@ impl Remesher<'_> {
 
     /// Applies a change if every check allows it.
     pub fn apply(&mut self, change: &Change) -> bool {
-        if !self.is_allowed(change) {
-            return false;
+        let is_allowed = self.is_allowed(change);
+        if is_allowed {
+            self.commit(change);
         }
+        is_allowed
+    }
+
+    /// Everything that the checks of a change depend on lies in this box, or has a corner in it.
+    pub fn reach(&self, change: &Change) -> Aabb {
+        let old = change.removed.iter().flat_map(|&t| self.mesh.corners(t));
+        let Aabb { low, high } =
+            Aabb::around(old.chain(self.corners_added(change).into_iter().flatten()));
+        let by = Point::splat(2.0 * self.envelope.tolerance);
+        Aabb { low: low - by, high: high + by }
+    }
+
+    /// Applies a change that is allowed.
+    pub fn commit(&mut self, change: &Change) {
+        let old = change.removed.iter().flat_map(|&t| self.mesh.triangles[t as usize]);
+        self.history.change(old.chain(change.added.iter().flat_map(|(t, _)| *t)));
         let mesh = &mut self.mesh;
         for &t in &change.removed {
             self.octree.remove(t);
@@ -104,10 +124,10 @@ impl Remesher<'_> {
             let t = mesh.add(t, label);
             self.octree.insert(t, Aabb::around(mesh.corners(t)));
         }
-        true
     }
 
-    fn is_allowed(&self, change: &Change) -> bool {
+    /// Returns whether every check allows a change.
+    pub fn is_allowed(&self, change: &Change) -> bool {
         let corners = self.corners_added(change);
         if !corners.iter().all(|t| quality(*t) > 1e-9) || !self.keeps_labels(change) {
             return false;
@@ -139,7 +159,8 @@ impl Remesher<'_> {
             .all(|t| t.into_iter().all(is_in_plane) && area_normal(t).dot(normal) > 0.0)
     }
 
-    fn keeps_labels(&self, change: &Change) -> bool {
+    /// Returns whether each label keeps a triangle.
+    pub fn keeps_labels(&self, change: &Change) -> bool {
         change.removed.iter().all(|&t| {
             let label = self.mesh.labels[t as usize];
             let n = |all: usize| all as u32;
@@ -241,26 +262,25 @@ impl Remesher<'_> {
         let tolerance = self.envelope.tolerance;
         let regions: Vec<Region> =
             corners.iter().filter_map(|t| Region::inner(*t, tolerance)).collect();
+        let mut open = Vec::new();
         for &t in &change.removed {
-            let old = self.mesh.corners(t);
-            let relying = self.envelope.relying(&old);
-            let open = relying.into_iter().filter(|part| !is_covered(part, &regions));
-            let open: Vec<_> = open.collect();
-            if open.is_empty() {
-                continue;
-            }
-            let mut all = regions.clone();
-            self.octree.meeting(&box_around(&old, 2.0 * tolerance), |s| {
-                if !change.removed.contains(&s) {
-                    all.extend(Region::inner(self.mesh.corners(s), tolerance));
-                }
-                false
-            });
-            if !open.iter().all(|part| is_covered(part, &all)) {
-                return false;
-            }
+            let relying = self.envelope.relying(&self.mesh.corners(t));
+            open.extend(relying.into_iter().filter(|part| !is_covered(part, &regions)));
         }
-        true
+        if open.is_empty() {
+            return true;
+        }
+        let mut all = regions;
+        let old = change.removed.iter().flat_map(|&t| self.mesh.corners(t));
+        let reach = Point::splat(2.0 * tolerance);
+        let Aabb { low, high } = Aabb::around(old);
+        self.octree.meeting(&Aabb { low: low - reach, high: high + reach }, |s| {
+            if !change.removed.contains(&s) {
+                all.extend(Region::inner(self.mesh.corners(s), tolerance));
+            }
+            false
+        });
+        open.iter().all(|part| is_covered(part, &all))
     }
 }
 
@@ -284,5 +304,21 @@ fn is_apart(p: &[Point; 3], p_ids: [u32; 3], q: &[Point; 3], q_ids: [u32; 3]) ->
                 })
         })
     };
-    by_edge(p, p_ids, q, q_ids) || by_edge(q, q_ids, p, p_ids)
+    // The corners of the one that are not the other's lie clearly on one side of the other's plane.
+    let by_plane = |p: &[Point; 3], p_ids: [u32; 3], q: &[Point; 3], q_ids: [u32; 3]| {
+        let normal = area_normal(*p);
+        let length = normal.length();
+        let side = |j: usize| {
+            let x = q[j] - p[0];
+            let d = normal.dot(x);
+            if d.abs() > CLEARLY * length * x.length() { d.signum() } else { 0.0 }
+        };
+        let mut sides = (0..3).filter(|&j| !p_ids.contains(&q_ids[j])).map(side);
+        let first = sides.next().unwrap_or(0.0);
+        first != 0.0 && sides.all(|s| s == first) && quality(*p) > NEEDLE
+    };
+    by_plane(p, p_ids, q, q_ids)
+        || by_plane(q, q_ids, p, p_ids)
+        || by_edge(p, p_ids, q, q_ids)
+        || by_edge(q, q_ids, p, p_ids)
 }

@@ -6,13 +6,14 @@
 //! curves (`chains`) stay within the tolerance of their own input; corners stay where they are.
 //!
 //! Reading order: `settings`, `region` (convex sets around a triangle), `envelope` (the distance bound), `octree`, `mesh`, `chains`, `sizes` and
-//! `sources` (wanted lengths), `change` (one replacement and its checks), `operations`, `passes`.
+//! `sources` (wanted lengths), `change` (one replacement and its checks), `history` (what failed before), `operations`, `passes`.
 //!
 //! Is not: repair. The input must be valid.
 
 mod chains;
 mod change;
 mod envelope;
+mod history;
 mod mesh;
 mod octree;
 mod operations;
@@ -49,7 +50,7 @@ const FACET: f64 = 2.0;
 
 /// Remeshes a valid surface without sheets or embedded parts.
 ///
-/// The result is the same for any number of threads. Memory: `scratch` for the tree of the input, and about 400 bytes for each triangle
+/// Lengths are at most `most` of their place. The result is the same for any number of threads. Memory: `scratch` for the tree of the input, and about 400 bytes for each triangle
 /// that there ever is. A cancelled run unwinds ([`attempt`](tetdb_base::storage::attempt)).
 ///
 /// # Errors
@@ -57,6 +58,7 @@ const FACET: f64 = 2.0;
 pub fn remesh(
     surface: &Surface,
     settings: &RemeshSettings,
+    most: &(dyn Fn(Point) -> f64 + Sync),
     scratch: &ScratchSpace,
     progress: &dyn Fn(f64),
 ) -> Result<(Surface, RemeshReport), SurfaceError> {
@@ -86,7 +88,7 @@ pub fn remesh(
     // A hair less than asked for: coordinates are rounded.
     let envelope = Envelope::new(&plain, settings.tolerance * (1.0 - 1e-6), scratch);
     let sources = sources::sources(&mesh, &chains, &envelope, &settings, scratch);
-    let sizes = Sizes::new(sources, settings.growth, [settings.hmin, settings.hmax], scratch);
+    let sizes = Sizes::new(sources, settings.growth, [settings.hmin, settings.hmax], most, scratch);
     let mut octree = Octree::new(plain.bounds());
     for t in 0..mesh.triangles.len() as u32 {
         octree.insert(t, Aabb::around(mesh.corners(t)));
@@ -100,8 +102,17 @@ pub fn remesh(
         corners: mesh.kinds.iter().filter(|k| **k == mesh::VertexKind::Corner).count() as u64,
         ..RemeshReport::default()
     };
-    let mut remesher =
-        Remesher { mesh, wanted, octree, envelope, chains, sizes, settings: &settings, report };
+    let mut remesher = Remesher {
+        mesh,
+        wanted,
+        octree,
+        envelope,
+        chains,
+        sizes,
+        settings: &settings,
+        report,
+        history: history::History::default(),
+    };
     if !remesher.run(triangles_max, progress) {
         return Err(too_many(triangles_max as u64, bytes_max));
     }

@@ -3,12 +3,15 @@
 use tetdb_base::geom::Point;
 
 use super::change::{Change, Remesher};
+use super::history::Operation;
 use super::mesh::{EdgeKey, Span, VertexKind, area_normal, cosine, edge};
 
 /// Triangles of this quality are good enough: a collapse that makes lengths right may lower better ones to it.
 const GOOD: f64 = 0.35;
-/// A flip or a move gains at least this much.
+/// A flip or a collapse for quality gains at least this much.
 const GAIN: f64 = 1e-3;
+/// A move gains at least this much: with a tenth of it, twice as many moves hardly change the result.
+const GAIN_MOVE: f64 = 0.01;
 
 impl Remesher<'_> {
     /// Length of an edge in units of the wanted one.
@@ -78,8 +81,47 @@ impl Remesher<'_> {
         None
     }
 
+    /// The change of an operation; `None` if it gains nothing or a check forbids it.
+    pub fn change_of(&self, operation: Operation) -> Option<Change> {
+        match operation {
+            Operation::Flip(e) => self.flip_of(e),
+            Operation::Collapse(e) => self.collapse_of(e, false),
+            Operation::CollapsePoor(e) => self.collapse_of(e, true),
+            Operation::Move(v) => self.relocation_of(v),
+        }
+    }
+
+    /// Does an operation if it is allowed and gains something.
+    pub fn attempt(&mut self, operation: Operation) -> bool {
+        if self.history.is_vain(operation) {
+            return false;
+        }
+        let change = self.change_of(operation);
+        self.settle(operation, change.as_ref(), self.history.n_changes)
+    }
+
+    /// Applies what came of an operation, evaluated after `n_changes` changes; returns whether there was a change.
+    pub fn settle(
+        &mut self,
+        operation: Operation,
+        change: Option<&Change>,
+        n_changes: u64,
+    ) -> bool {
+        let Some(change) = change else {
+            self.history.fail(operation, n_changes);
+            return false;
+        };
+        self.commit(change);
+        *match operation {
+            Operation::Flip(_) => &mut self.report.flips,
+            Operation::Collapse(_) | Operation::CollapsePoor(_) => &mut self.report.collapses,
+            Operation::Move(_) => &mut self.report.moves,
+        } += 1;
+        true
+    }
+
     /// Collapses an edge if that makes no triangle poor and no edge too long; `for_quality`, if it raises the least quality.
-    pub fn collapse(&mut self, (a, b): EdgeKey, for_quality: bool) -> bool {
+    fn collapse_of(&self, (a, b): EdgeKey, for_quality: bool) -> Option<Change> {
         use VertexKind::{Corner, Curve, Free};
         let kinds = [a, b].map(|v| self.mesh.kinds[v as usize]);
         let is_kept = self.mesh.features.contains_key(&(a, b));
@@ -99,12 +141,13 @@ impl Remesher<'_> {
             ([Curve, Curve], true) => tries.extend([(a, b, points[1]), (b, a, points[0])]),
             ([Curve, Corner], true) => tries.push((a, b, points[1])),
             ([Corner, Curve], true) => tries.push((b, a, points[0])),
-            _ => return false,
+            _ => {}
         }
-        tries.into_iter().any(|(gone, stays, p)| self.collapse_to(gone, stays, p, for_quality))
+        let mut tries = tries.into_iter();
+        tries.find_map(|(gone, stays, p)| self.collapse_to(gone, stays, p, for_quality))
     }
 
-    fn collapse_to(&mut self, gone: u32, stays: u32, p: Point, for_quality: bool) -> bool {
+    fn collapse_to(&self, gone: u32, stays: u32, p: Point, for_quality: bool) -> Option<Change> {
         let at_edge = self.mesh.at_edge(gone, stays);
         let mut apexes: Vec<u32> =
             at_edge.iter().map(|&t| self.mesh.apex(t, gone, stays)).collect();
@@ -113,7 +156,7 @@ impl Remesher<'_> {
         let mut common = self.mesh.neighbors(gone);
         common.retain(|v| near.binary_search(v).is_ok());
         if common != apexes {
-            return false;
+            return None;
         }
         let mut change = Change { moved: Some((stays, p)), ..Change::default() };
         let stays_put = p == self.mesh.points[stays as usize];
@@ -133,16 +176,14 @@ impl Remesher<'_> {
         }
         change.removed = removed;
         if change.added.is_empty() || !self.collapse_curve(gone, stays, &mut change) {
-            return false;
+            return None;
         }
         let [before, after] = self.qualities(&change);
         let is_good = match for_quality {
             true => after > before + GAIN,
             false => after >= before.min(GOOD) && !self.makes_long(gone, stays, p, before),
         };
-        let done = is_good && self.apply(&change);
-        self.report.collapses += u64::from(done);
-        done
+        (is_good && self.is_allowed(&change)).then_some(change)
     }
 
     /// Returns whether a collapse makes an edge that would be divided again; not where it removes a needle.
@@ -184,8 +225,14 @@ impl Remesher<'_> {
         true
     }
 
-    /// Swaps the edge between two triangles if that raises their least quality.
+    /// Swaps the edge between two triangles if that raises their least quality; returns the new edge.
     pub fn flip(&mut self, (a, b): EdgeKey) -> Option<EdgeKey> {
+        let apexes = self.mesh.at_edge(a, b).into_iter().map(|t| self.mesh.apex(t, a, b));
+        let [c, d] = apexes.collect::<Vec<_>>()[..] else { return None };
+        self.attempt(Operation::Flip((a, b))).then(|| edge(c, d))
+    }
+
+    fn flip_of(&self, (a, b): EdgeKey) -> Option<Change> {
         if self.mesh.features.contains_key(&(a, b)) {
             return None;
         }
@@ -207,18 +254,17 @@ impl Remesher<'_> {
         let normals = added.map(|(t, _)| area_normal(t.map(point)));
         if after < before + GAIN.min(0.1 * before)
             || cosine(normals[0], normals[1]) < self.settings.feature_cos
-            || !self.apply(&change)
+            || !self.is_allowed(&change)
         {
             return None;
         }
-        self.report.flips += 1;
-        Some(edge(c, d))
+        Some(change)
     }
 
     /// Moves a vertex to the middle of its neighbors, on the surface or along its curve, if that raises the least quality around it.
-    pub fn relocate(&mut self, v: u32) -> bool {
+    fn relocation_of(&self, v: u32) -> Option<Change> {
         let place = match self.mesh.kinds[v as usize] {
-            VertexKind::Corner => return false,
+            VertexKind::Corner => return None,
             VertexKind::Free => self.middle_of_star(v),
             VertexKind::Curve => None,
         };
@@ -230,7 +276,7 @@ impl Remesher<'_> {
             }
             None => None,
         };
-        let Some(p) = place else { return false };
+        let p = place?;
         change.moved = Some((v, p));
         change.removed.clone_from(&self.mesh.around[v as usize]);
         for (k, &t) in change.removed.iter().enumerate() {
@@ -238,9 +284,7 @@ impl Remesher<'_> {
             change.same.push((t, k));
         }
         let [before, after] = self.qualities(&change);
-        let done = after > before + GAIN && self.apply(&change);
-        self.report.moves += u64::from(done);
-        done
+        (after > before + GAIN_MOVE && self.is_allowed(&change)).then_some(change)
     }
 
     fn middle_of_star(&self, v: u32) -> Option<Point> {

@@ -3,9 +3,12 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use tetdb_base::storage::check_cancelled;
+use rayon::prelude::*;
+use tetdb_base::geom::Aabb;
+use tetdb_base::storage::{check_cancelled, parallel};
 
-use super::change::Remesher;
+use super::change::{Change, Remesher};
+use super::history::Operation;
 use super::mesh::{EdgeKey, edge, quality};
 
 /// Edges longer than this, in units of the wanted length, are divided; those shorter than `SHORT` collapse (Botsch and Kobbelt 2004).
@@ -20,6 +23,15 @@ const LAST_ROUNDS: usize = 6;
 const POOR: f64 = 0.55;
 /// Triangles below this quality (15 degrees) are divided where nothing else helps.
 const NEEDLE: f64 = 0.4;
+
+/// Operations that all threads evaluate before their changes are applied: with more, more are evaluated twice; with less, threads wait.
+const BATCH: usize = 512;
+
+/// Puts operations that follow each other into different batches, for neighbors get in each other's way.
+fn spread(operations: Vec<Operation>) -> Vec<Operation> {
+    let n = operations.len().div_ceil(BATCH).max(1);
+    (0..n).flat_map(|k| operations[k.min(operations.len())..].iter().step_by(n).copied()).collect()
+}
 
 /// Calls made between two looks at whether the run is cancelled.
 fn each<T>(items: impl IntoIterator<Item = T>, mut visit: impl FnMut(T)) {
@@ -102,21 +114,16 @@ impl Remesher<'_> {
             }
         }
         short.sort_unstable();
-        each(short, |(_, e)| {
-            if !self.mesh.at_edge(e.0, e.1).is_empty() && self.relative_length(e) < SHORT {
-                self.collapse(e, false);
-            }
-        });
+        self.in_batches(
+            &short.into_iter().map(|(_, e)| Operation::Collapse(e)).collect::<Vec<_>>(),
+        );
     }
 
     fn flips(&mut self) {
         for _ in 0..4 {
             let before = self.report.flips;
-            each(self.mesh.edges(), |e| {
-                if !self.mesh.at_edge(e.0, e.1).is_empty() {
-                    self.flip(e);
-                }
-            });
+            let edges = self.mesh.edges().into_iter().map(Operation::Flip).collect();
+            self.in_batches(&spread(edges));
             if self.report.flips - before < self.mesh.triangles.len() as u64 / 200 + 1 {
                 break;
             }
@@ -125,12 +132,52 @@ impl Remesher<'_> {
 
     fn moves(&mut self, n: usize) {
         for _ in 0..n {
-            each(0..self.mesh.points.len() as u32, |v| {
-                if !self.mesh.around[v as usize].is_empty() {
-                    self.relocate(v);
-                }
-            });
+            let vertices = 0..self.mesh.points.len() as u32;
+            self.in_batches(&spread(vertices.map(Operation::Move).collect()));
         }
+    }
+
+    /// Does operations batch by batch: all threads evaluate a batch, and then its changes are applied in order. One near a change of the same
+    /// batch is evaluated again. So the result does not depend on the number of threads.
+    fn in_batches(&mut self, operations: &[Operation]) {
+        for batch in operations.chunks(BATCH) {
+            check_cancelled();
+            let batch: Vec<Operation> =
+                batch.iter().copied().filter(|o| self.is_possible(*o)).collect();
+            let (this, before) = (&*self, self.history.n_changes);
+            let changes: Vec<Option<Change>> =
+                parallel(|| batch.par_iter().map(|&o| this.change_of(o)).collect());
+            let mut done: Vec<Aabb> = Vec::new();
+            for (operation, mut change) in batch.into_iter().zip(changes) {
+                if let Some(found) = &change {
+                    let reach = self.reach(found);
+                    if done.iter().any(|b| b.meets(&reach)) {
+                        change = self
+                            .is_possible(operation)
+                            .then(|| self.change_of(operation))
+                            .flatten();
+                    } else if !self.keeps_labels(found) {
+                        change = None;
+                    }
+                }
+                done.extend(change.as_ref().map(|change| self.reach(change)));
+                self.settle(operation, change.as_ref(), before);
+            }
+        }
+    }
+
+    /// Returns whether the edge or vertex of an operation is there and worth a try.
+    fn is_possible(&self, operation: Operation) -> bool {
+        let is_there = match operation {
+            Operation::Move(v) => !self.mesh.around[v as usize].is_empty(),
+            Operation::Collapse(e) => {
+                !self.mesh.at_edge(e.0, e.1).is_empty() && self.relative_length(e) < SHORT
+            }
+            Operation::Flip(e) | Operation::CollapsePoor(e) => {
+                !self.mesh.at_edge(e.0, e.1).is_empty()
+            }
+        };
+        is_there && !self.history.is_vain(operation)
     }
 
     /// Tries everything at poor triangles, the poorest first; returns the number of changes.
@@ -160,10 +207,10 @@ impl Remesher<'_> {
             let is_needle =
                 q < NEEDLE.to_bits() && length(edges[2]) > 3.0 * self.envelope.tolerance;
             let done = self.flip(edges[2]).is_some()
-                || self.collapse(edges[0], true)
-                || corners.into_iter().any(|v| self.relocate(v))
+                || self.attempt(Operation::CollapsePoor(edges[0]))
+                || corners.into_iter().any(|v| self.attempt(Operation::Move(v)))
                 || self.flip(edges[1]).is_some()
-                || self.collapse(edges[1], true);
+                || self.attempt(Operation::CollapsePoor(edges[1]));
             // Kept curves on both sides forbid all that; halves are less flat.
             if !done && is_needle {
                 self.split(edges[2]);

@@ -213,6 +213,18 @@ const PIECES_MAX: usize = 600;
 
 /// Returns whether every point of a polygon lies in a region; some polygons that do are denied.
 pub fn is_covered(polygon: &Polygon, regions: &[Region]) -> bool {
+    if regions.iter().any(|r| r.contains(polygon)) {
+        return true;
+    }
+    let middle = polygon.corners().iter().copied().sum::<Point>() / polygon.n as f64;
+    let holds = |r: &Region| r.planes.iter().all(|(n, d)| n.dot(middle) <= *d);
+    // The region around the middle first: it leaves the fewest pieces. Without one, the middle is not covered.
+    let Some(first_of_all) = regions.iter().position(holds) else { return false };
+    let order = |k: usize| match k {
+        0 => &regions[first_of_all],
+        k if k <= first_of_all => &regions[k - 1],
+        k => &regions[k],
+    };
     let mut stack = vec![(*polygon, 0)];
     let mut n_pieces = 0;
     while let Some((piece, first)) = stack.pop() {
@@ -220,12 +232,12 @@ pub fn is_covered(polygon: &Polygon, regions: &[Region]) -> bool {
         if n_pieces > PIECES_MAX {
             return false;
         }
-        if regions[first..].iter().any(|r| r.contains(&piece)) {
+        if n_pieces > 1 && (first..regions.len()).any(|k| order(k).contains(&piece)) {
             continue;
         }
         let mut is_cut = false;
-        for (i, region) in regions.iter().enumerate().skip(first) {
-            match region.cut(&piece) {
+        for i in first..regions.len() {
+            match order(i).cut(&piece) {
                 Cut::Outside | Cut::Unclear => {}
                 Cut::Inside => is_cut = true,
                 Cut::Parts(parts) => {

@@ -1,5 +1,7 @@
 //! What is asked for and what was done.
 
+use tetdb_base::geom::short;
+
 /// What to do. Lengths are in input units.
 #[derive(Clone, Copy, Debug)]
 pub struct RemeshSettings {
@@ -13,6 +15,20 @@ pub struct RemeshSettings {
     pub hmin: f64,
     /// Growth of lengths with the distance.
     pub growth: f64,
+}
+
+impl RemeshReport {
+    /// What was done, in words.
+    pub fn in_words(&self) -> String {
+        format!(
+            "{} triangles became {}, with a smallest angle of {} degrees ({} before); no point of either surface is farther than {} from the other",
+            self.triangles_before,
+            self.triangles,
+            short(self.angle),
+            short(self.angle_before),
+            short(self.distance_bound)
+        )
+    }
 }
 
 /// What was done.

@@ -10,7 +10,7 @@ pub type Source = (Point, f64);
 /// Wanted lengths everywhere.
 ///
 /// Invariant: the length changes by at most `growth` times the distance, and lies between `least` and `most`.
-pub struct Sizes {
+pub struct Sizes<'a> {
     sources: Vec<Source>,
     tree: Option<BoxTree>,
     /// Least length of each node of the tree, by level.
@@ -18,14 +18,17 @@ pub struct Sizes {
     growth: f64,
     least: f64,
     most: f64,
+    /// The most at a place.
+    most_at: &'a (dyn Fn(Point) -> f64 + Sync),
 }
 
-impl Sizes {
+impl<'a> Sizes<'a> {
     /// Lengths from sources.
     pub fn new(
         sources: Vec<Source>,
         growth: f64,
         [least, most]: [f64; 2],
+        most_at: &'a (dyn Fn(Point) -> f64 + Sync),
         scratch: &ScratchSpace,
     ) -> Self {
         let sources = thinned(sources);
@@ -49,7 +52,7 @@ impl Sizes {
             let of_level = (0..nodes.len()).map(low).collect();
             lows.push(of_level);
         }
-        Self { sources, tree, lows, growth, least, most }
+        Self { sources, tree, lows, growth, least, most, most_at }
     }
 
     /// The wanted length at a place.
@@ -60,8 +63,8 @@ impl Sizes {
     /// The same, quicker with places nearby whose lengths are known.
     pub fn near(&self, p: Point, known: impl Iterator<Item = Source>) -> f64 {
         let bounds = known.map(|(q, h)| h + self.growth * p.distance(q));
-        let mut best = bounds.fold(self.most, f64::min);
-        let Some(tree) = &self.tree else { return best };
+        let mut best = bounds.fold(self.most.min((self.most_at)(p)), f64::min);
+        let Some(tree) = &self.tree else { return best.max(self.least) };
         let bound = |level: usize, node: usize| {
             let b = tree.levels[level].get(node);
             let away = (b.low - p).max(p - b.high).max(Point::ZERO).length();
@@ -110,7 +113,8 @@ mod tests {
     #[test]
     fn lengths_grow_from_the_sources_up_to_the_most() {
         let sources = vec![(Point::ZERO, 0.1), (Point::X * 10.0, 0.5), (Point::X * 0.01, 0.3)];
-        let sizes = Sizes::new(sources, 0.25, [0.01, 1.0], &ScratchSpace::boundless());
+        let sizes =
+            Sizes::new(sources, 0.25, [0.01, 1.0], &|_| f64::INFINITY, &ScratchSpace::boundless());
         assert_eq!(sizes.at(Point::ZERO), 0.1);
         assert!((sizes.at(Point::Y) - 0.35).abs() < 1e-12);
         assert!((sizes.at(Point::X * 9.0) - 0.75).abs() < 1e-12);

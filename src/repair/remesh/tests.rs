@@ -147,7 +147,8 @@ fn distance(a: &Surface, b: &Surface) -> f64 {
 fn remeshed(surface: &Surface, settings: &RemeshSettings) -> (Surface, RemeshReport) {
     assert!(validate(surface).is_valid(), "{:?}", validate(surface).defects.first());
     let scratch = ScratchSpace::boundless();
-    let (result, report) = remesh(surface, settings, &scratch, &|_| ()).unwrap();
+    let (result, report) =
+        remesh(surface, settings, &|_| f64::INFINITY, &scratch, &|_| ()).unwrap();
     let found = validate(&result);
     assert!(found.is_valid(), "{:?}", found.defects.first());
     assert_eq!(euler(surface), euler(&result));
@@ -286,10 +287,10 @@ fn the_result_is_the_same_each_time_and_at_each_scale() {
 #[test]
 fn a_surface_that_does_not_fit_is_refused() {
     let scratch = ScratchSpace::new(1 << 16, std::env::temp_dir());
-    let refused = remesh(&lump(9, 1), &settings(0.01), &scratch, &|_| ());
+    let refused = remesh(&lump(9, 1), &settings(0.01), &|_| f64::INFINITY, &scratch, &|_| ());
     assert!(matches!(refused, Err(SurfaceError::Memory { .. })), "{refused:?}");
     let scratch = ScratchSpace::new(1 << 20, std::env::temp_dir());
     let fine = RemeshSettings { hmax: 1e-3, hmin: 1e-3, ..settings(0.01) };
-    let refused = remesh(&lump(9, 1), &fine, &scratch, &|_| ());
+    let refused = remesh(&lump(9, 1), &fine, &|_| f64::INFINITY, &scratch, &|_| ());
     assert!(matches!(refused, Err(SurfaceError::SplitMemory { .. })), "{refused:?}");
 }

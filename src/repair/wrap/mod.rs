@@ -30,7 +30,7 @@ use tetdb_base::surface::Surface;
 
 use delaunay::N_FAR;
 use flood::Flood;
-use oracle::Oracle;
+use oracle::{Oracle, Pieces};
 pub use settings::{WrapError, WrapReport, WrapSettings};
 
 /// Extents and coordinates beyond which squares and cubes of lengths leave the range of doubles.
@@ -39,6 +39,10 @@ const EXTENTS: std::ops::Range<f64> = 1e-20..1e40;
 const OFFSET_LEAST: f64 = 1e-10;
 /// Bytes of the wrap for a triangle: what is returned, the tree over it and its distances.
 const BYTES_WRAP: u64 = 250;
+/// Pieces of long triangles, for each triangle at most, and in all.
+const PIECES: usize = 40;
+/// See [`PIECES`]: they take 320 MB.
+const PIECES_MAX: usize = 2_000_000;
 
 /// Triangles, edges and points as triangles, the latter with equal corners.
 struct Parts<'a> {
@@ -98,8 +102,11 @@ pub fn wrap(
     }
     let bounds = Aabb::around((0..n as u32).flat_map(|t| parts.corners(t)));
     check(bounds, settings)?;
-    let _input = leased(scratch, n as u64 * Oracle::BYTES_TRIANGLE)?;
-    let oracle = Oracle::new(n, |t| parts.corners(t));
+    let input = leased(scratch, n as u64 * Oracle::BYTES_PIECE)?;
+    let pieces = Pieces::new(n, n + (PIECES * n).min(PIECES_MAX), |t| parts.corners(t));
+    drop(input);
+    let _input = leased(scratch, pieces.len() as u64 * Oracle::BYTES_PIECE)?;
+    let oracle = Oracle::new(pieces, |t| parts.corners(t));
     let mut flood = Flood::new(&oracle, bounds, gap, offset);
     flood.run(scratch, progress)?;
     check_cancelled();
@@ -131,7 +138,10 @@ pub fn wrap(
         measure::distances(result.n_triangles(), |t| result.corners(t), gap, &oracle);
     result.labels = nearest.into_iter().map(|t| parts.part(t).1).collect();
     drop(oracle);
-    let own = Oracle::new(result.n_triangles(), |t| result.corners(t));
+    let own = Oracle::new(
+        Pieces::new(result.n_triangles(), result.n_triangles(), |t| result.corners(t)),
+        |t| result.corners(t),
+    );
     let (from, _) = measure::distances(n, |t| parts.corners(t), gap, &own);
     let report = WrapReport {
         gap,

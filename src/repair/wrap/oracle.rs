@@ -19,6 +19,8 @@ const THIN: f64 = 1e-5;
 
 /// A binary tree of boxes over triangles; edges and points are triangles with equal corners.
 ///
+/// Long triangles are there once for each of their pieces: the box of one that crosses everything would say nothing.
+///
 /// Node 1 is the root, nodes 2 i and 2 i + 1 are below node i. Each level halves all ranges, so that no node needs to name its range.
 pub struct Oracle {
     corners: Vec<[Point; 3]>,
@@ -42,35 +44,37 @@ pub struct Nearest {
 }
 
 impl Oracle {
-    /// Bytes held for each triangle, those needed on the way included.
-    pub const BYTES_TRIANGLE: u64 = 160;
+    /// Bytes held for each piece of a triangle, those needed on the way included.
+    pub const BYTES_PIECE: u64 = 160;
 
-    /// A tree over `n` triangles, at least one.
-    pub fn new(n: usize, corners_of: impl Fn(u32) -> [Point; 3] + Sync) -> Self {
+    /// A tree over triangles, at least one.
+    pub fn new(pieces: Pieces, corners_of: impl Fn(u32) -> [Point; 3] + Sync) -> Self {
+        let Pieces { owners, boxes: around } = pieces;
+        let n = owners.len();
         let depth = n.div_ceil(LEAF).next_power_of_two().trailing_zeros();
-        let (ids, corners, is_thin) = parallel(|| {
+        let (order, corners, is_thin) = parallel(|| {
             let middles: Vec<Point> = (0..n as u32)
                 .into_par_iter()
-                .map(|t| {
-                    let Aabb { low, high } = Aabb::around(corners_of(t));
-                    (low + high) * 0.5
-                })
+                .map(|k| (around[k as usize].low + around[k as usize].high) * 0.5)
                 .collect();
             let mut ids: Vec<u32> = (0..n as u32).collect();
             divide(&mut ids, &middles, Range { n, depth, at: 0, level: 0 });
-            let corners: Vec<[Point; 3]> = ids.par_iter().map(|&t| corners_of(t)).collect();
+            let corners: Vec<[Point; 3]> =
+                ids.par_iter().map(|&k| corners_of(owners[k as usize])).collect();
             let is_thin: Vec<bool> = corners.par_iter().map(is_thin).collect();
             (ids, corners, is_thin)
         });
         let n_leaves = 1usize << depth;
         let mut boxes = filled(2 * n_leaves, Aabb::EMPTY);
         for leaf in 0..n_leaves {
-            let members = &corners[(leaf * n) >> depth..((leaf + 1) * n) >> depth];
-            boxes[n_leaves + leaf] = Aabb::around(members.iter().flatten().copied());
+            let members = &order[(leaf * n) >> depth..((leaf + 1) * n) >> depth];
+            let of_members = members.iter().map(|&k| around[k as usize]);
+            boxes[n_leaves + leaf] = of_members.fold(Aabb::EMPTY, Aabb::union);
         }
         for node in (1..n_leaves).rev() {
             boxes[node] = boxes[2 * node].union(boxes[2 * node + 1]);
         }
+        let ids = order.into_iter().map(|k| owners[k as usize]).collect();
         Self { corners, ids, is_thin, boxes, depth }
     }
 
@@ -173,6 +177,77 @@ impl Oracle {
         }
         false
     }
+}
+
+/// Triangles longer than this share of the box diagonal are divided into pieces that are shorter, or twice that and so on if that gives too many.
+const PIECE: f64 = 1.0 / 64.0;
+/// Halvings of one triangle at most.
+const HALVINGS: u32 = 12;
+/// Boxes of pieces grow by this share of the largest coordinate: the rounding of twelve middles is far less.
+const ROUNDING: f64 = 1e-14;
+
+/// The pieces of all triangles: the triangle of each, and its box.
+pub struct Pieces {
+    owners: Vec<u32>,
+    boxes: Vec<Aabb>,
+}
+
+impl Pieces {
+    /// The pieces of `n` triangles, about `n_max` of them at most.
+    pub fn new(n: usize, n_max: usize, corners_of: impl Fn(u32) -> [Point; 3] + Sync) -> Self {
+        let around = |t: u32| Aabb::around(corners_of(t));
+        let is_long = |t: u32, length: f64| (around(t).high - around(t).low).length() > length;
+        let count = |t: u32, length: f64| -> usize {
+            let mut count = 0;
+            halve(corners_of(t), length, HALVINGS, &mut |_| count += 1);
+            count
+        };
+        let all = || (0..n as u32).into_par_iter();
+        let bounds = parallel(|| all().map(around).reduce(|| Aabb::EMPTY, Aabb::union));
+        let mut length = PIECE * bounds.diagonal();
+        while length < bounds.diagonal()
+            && parallel(|| all().map(|t| count(t, length)).sum::<usize>()) > n_max
+        {
+            length *= 2.0;
+        }
+        let by = Point::splat(ROUNDING * bounds.low.abs().max(bounds.high.abs()).max_element());
+        let of = |t: u32| {
+            let (whole, mut boxes) = (around(t), Vec::new());
+            match is_long(t, length) {
+                false => boxes.push((t, whole)),
+                true => halve(corners_of(t), length, HALVINGS, &mut |piece| {
+                    let Aabb { low, high } = Aabb::around(piece);
+                    let (low, high) = ((low - by).max(whole.low), (high + by).min(whole.high));
+                    boxes.push((t, Aabb { low, high }));
+                }),
+            }
+            boxes
+        };
+        let (owners, boxes) = parallel(|| all().flat_map_iter(of).unzip());
+        Self { owners, boxes }
+    }
+
+    /// Their number.
+    pub fn len(&self) -> usize {
+        self.owners.len()
+    }
+}
+
+/// Halves the longest edge of a triangle until none is longer than `length`.
+fn halve([a, b, c]: [Point; 3], length: f64, halvings: u32, visit: &mut impl FnMut([Point; 3])) {
+    let edges = [a.distance_squared(b), b.distance_squared(c), c.distance_squared(a)];
+    let longest = edges[0].max(edges[1]).max(edges[2]);
+    if halvings == 0 || longest <= length * length {
+        return visit([a, b, c]);
+    }
+    let [a, b, c] = match edges {
+        [x, ..] if x == longest => [a, b, c],
+        [_, y, _] if y == longest => [b, c, a],
+        _ => [c, a, b],
+    };
+    let middle = (a + b) * 0.5;
+    halve([a, middle, c], length, halvings - 1, visit);
+    halve([middle, b, c], length, halvings - 1, visit);
 }
 
 /// A range of all triangles: the `at`-th of its level.
@@ -306,7 +381,7 @@ mod tests {
                     _ => [a, a + point(k + 1) * 0.3, a + point(k + 2) * 0.1],
                 }
             };
-            let oracle = Oracle::new(n, corners);
+            let oracle = Oracle::new(Pieces::new(n, 20 * n, corners), corners);
             for k in 5000..5200 {
                 let p = point(k) * 2.0 - Point::splat(0.5);
                 let found = oracle.nearest(p, f64::INFINITY);
