@@ -70,6 +70,7 @@ pub use surface::{SurfaceWritten, check_surface_format, surface, wires};
 pub use vtk::{SelectedTet, SelectedVtu, defects};
 
 use merged::{Merged, ReadProgress};
+pub use numbering::each_vertex_number;
 use output_files::{OutputFiles, STDOUT};
 use scope::{FaceSet, Scope};
 use tetdb_base::storage::attempt;
