@@ -12,11 +12,11 @@ const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;
 
 pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
     let settings = console.settings(memory::requested(args.read.memory.as_deref())?, None);
-    let snapshot = snapshot(args).map_err(|error| match error.code {
+    let store = Store::open_with(&args.store, settings)?;
+    let snapshot = snapshot(args, &store).map_err(|error| match error.code {
         Code::BadQuery => error.help("`tetdb snapshot --help` has examples"),
         _ => error,
     })?;
-    let store = Store::open_with(&args.store, settings)?;
     let snapped = store.snapshot(&args.output, &snapshot).map_err(|error| {
         match (error.code(), &args.plane) {
             (Code::BadQuery, Some(plane)) => {
@@ -31,7 +31,7 @@ pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
 }
 
 /// The requested picture. Errors: options that make no sense.
-fn snapshot(args: &SnapshotArgs) -> Result<Snapshot, Failure> {
+fn snapshot(args: &SnapshotArgs, store: &Store) -> Result<Snapshot, Failure> {
     let [width, height] = pixels(&args.size)?;
     let (mut snapshot, in_space) = subject(args)?;
     if let (Some(from), false) = (&args.from, in_space) {
@@ -64,7 +64,7 @@ fn snapshot(args: &SnapshotArgs) -> Result<Snapshot, Failure> {
         snapshot = snapshot.seen_from(from);
     }
     if let Some(text) = &args.condition {
-        snapshot = snapshot.condition(condition(text)?);
+        snapshot = snapshot.condition(condition(text, store)?);
     }
     Ok(match args.crinkle {
         true => snapshot.crinkle(),

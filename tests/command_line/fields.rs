@@ -224,3 +224,65 @@ fn kills_leave_the_old_or_the_new() {
     assert_eq!(files, 2);
     place.run_line("verify a.tetdb").succeeds();
 }
+
+/// Conditions, columns and orders by field are those of the same numbers computed from the mesh; chunks out of range are not read.
+#[test]
+fn questions_name_fields() {
+    let place = Place::new();
+    // Kept as pages, a small mesh has many chunks.
+    let mesh = "mesh sample:box,h=0.045 -o a.tetdb --subdomains 2 --seal none --no-verify";
+    place.run_line(mesh).succeeds();
+    for line in [
+        "T --at tets --from 300+100*x",
+        "big --at tets --from 9007199254740992+round(10*x) --type i64",
+        "u --at vertices --from x,y,2*z",
+        "hole --at vertices --from sqrt(x-0.5)",
+    ] {
+        place.run_line(&format!("field a.tetdb add {line}")).succeeds();
+    }
+    let ask = |condition: &str, more: &str| {
+        let words = ["query", "a.tetdb", "--where", condition, "--select", "id", "--csv"];
+        let more: Vec<&str> = more.split_whitespace().collect();
+        let done = place.run(&[&words[..], &more[..]].concat()).succeeds();
+        let read =
+            done.stderr().split("read ").nth(1).and_then(|s| s.split(' ').next()?.parse().ok());
+        (done.stdout(), read.unwrap_or(u64::MAX))
+    };
+    let all = ask("quality > 0", "").1;
+    for (by_field, by_place) in [
+        ("T > 390 && x > 0", "x > 0.9"),
+        ("T < 305 or T > 395", "x < 0.05 or x > 0.95"),
+        ("u.x > 0.9 and not (u.z < 1)", "x > 0.9 and z >= 0.5"),
+        ("u.y = 17", "x > 17"),
+    ] {
+        let (found, read) = ask(by_field, "");
+        let (expected, _) = ask(by_place, "");
+        let differ = found.lines().filter(|line| !expected.contains(line)).count();
+        // A mean of four products need not round as the product of the mean.
+        assert!(differ <= 2, "{by_field}: {differ} of {}", found.lines().count());
+        assert!(found.lines().count().abs_diff(expected.lines().count()) <= 2, "{by_field}");
+        assert!(read < all, "{by_field}: {read} of {all}");
+        let small = ask(by_field, "--memory 64MiB").0;
+        assert_eq!(small, found, "{by_field}");
+    }
+    // NaN fulfills no comparison, and its negation.
+    let n = |condition: &str| ask(condition, "").0.lines().count() - 1;
+    assert_eq!(n("hole >= 0") + n("not (hole >= 0)"), n("quality > 0"));
+    let line = "query a.tetdb --order-by T --desc --limit 5 --select id,T,big,u.z --json";
+    let rows = place.run_line(line).succeeds().stdout();
+    let rows: Vec<Value> =
+        rows.lines().map(|row| serde_json::from_str(row).expect("an object")).collect();
+    assert!(rows.windows(2).all(|two| two[0]["T"].as_f64() >= two[1]["T"].as_f64()), "{rows:?}");
+    assert_eq!(rows[0]["big"].as_i64(), Some((1 << 53) + 10));
+    assert!(rows.iter().all(|row| row["u.z"].as_f64() >= Some(0.0)));
+    for (words, code) in [
+        ("query a.tetdb --where V>1", "bad-expression"),
+        ("query a.tetdb --where u>1", "bad-expression"),
+        ("query a.tetdb --order-by u.w", "bad-query"),
+        ("query a.tetdb --select id,u.w", "bad-query"),
+        ("query a.tetdb --point 0.1,0.1,0.1 --select id,T", "bad-query"),
+    ] {
+        let error = place.run_line(&format!("{words} --json")).error();
+        assert_eq!(error["code"], code, "{words}: {error}");
+    }
+}

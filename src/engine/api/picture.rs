@@ -310,8 +310,11 @@ fn pieces(
         None => [middle, thinnest(&bounds)],
     });
     let view = View::new(point, normal);
-    let condition = snapshot.condition.clone().map(|condition| condition.0);
-    let selection = Selection { condition, ..Selection::default() };
+    let (condition, condition_extra) = match snapshot.condition.clone() {
+        Some(Condition { expression, extra }) => (Some(expression), extra),
+        None => (None, Vec::new()),
+    };
+    let selection = Selection { condition, condition_extra, ..Selection::default() };
     let section = view::section(session, &view, snapshot.crinkle, selection, dir, memory)?;
     Ok((section, view))
 }

@@ -9,6 +9,7 @@ use tetdb_schema::record::SealedTet;
 
 use super::QueryError;
 use super::decoded::{DecodedChunk, Searched};
+use super::extra::OpenField;
 use super::surface_faces::SurfaceFaces;
 use super::tree::OctalBoxTree;
 use crate::sealed::{Chunk, Subdomain};
@@ -90,8 +91,10 @@ pub struct QuerySession {
     /// Over the boxes of the sub-domains.
     pub(super) tree: OctalBoxTree,
     bounds: Aabb,
-    parts: LruCache<u32, OpenSubdomain>,
+    pub(super) parts: LruCache<u32, OpenSubdomain>,
     parts_max: usize,
+    /// By number of the field and rank.
+    pub(super) fields: LruCache<(u32, u32), OpenField>,
     frames: LruCache<(u32, u32), Arc<Searched>>,
     frames_bytes: usize,
     frames_bytes_max: usize,
@@ -168,6 +171,7 @@ impl QuerySession {
             bounds,
             parts: LruCache::unbounded(),
             parts_max: parts_max as usize,
+            fields: LruCache::unbounded(),
             frames: LruCache::unbounded(),
             frames_bytes: 0,
             frames_bytes_max: frames_bytes_max as usize,

@@ -17,8 +17,8 @@ use super::form::Loader;
 use super::{SealedError, Subdomain};
 use tetdb_base::storage::{DiskPath, StoreFile, check_cancelled};
 
-/// Bytes of decoded columns that a reader keeps.
-const COLUMNS_BYTES_MAX: usize = 8 << 20;
+/// Bytes of decoded columns while a file is written.
+const COLUMNS_BYTES: usize = 4 << 20;
 
 /// Numbers of the first value and of values in each chunk that a field lines up with.
 fn chunks_of(place: FieldPlace, mesh: &Subdomain) -> Vec<[u32; 2]> {
@@ -181,6 +181,7 @@ pub struct FieldFile {
     over_tets: Vec<FieldSummary<true>>,
     columns: LruCache<(u32, u32), FieldColumn>,
     columns_bytes: usize,
+    columns_bytes_max: usize,
     /// The last column used of each component: its chunk, first value and numbers.
     last: Vec<(u32, u32, FieldColumn)>,
 }
@@ -195,17 +196,28 @@ impl FieldFile {
     ) -> Self {
         let last = vec![(0, 0, FieldColumn::from([])); field.components as usize];
         let columns = LruCache::unbounded();
-        Self { file, field, part, summaries, over_tets, columns, columns_bytes: 0, last }
+        let columns_bytes_max = COLUMNS_BYTES;
+        Self {
+            file,
+            field,
+            part,
+            summaries,
+            over_tets,
+            columns,
+            columns_bytes: 0,
+            columns_bytes_max,
+            last,
+        }
     }
 
-    /// Opens the values of `field` in the sub-domain `mesh` with `cache_bytes` for redb.
+    /// Opens the values of `field` in the sub-domain `mesh` with `memory_bytes` for redb and decoded columns.
     ///
     /// Errors: damage; values of another generation of the mesh.
     pub fn open(
         path: &DiskPath,
         (field, part): (FieldRow, FieldPart),
         mesh: &Subdomain,
-        cache_bytes: usize,
+        memory_bytes: usize,
     ) -> Result<Self, SealedError> {
         let damaged = |what: &str| {
             SealedError::content(path.path(), part.rank, format!("field {}: {what}", field.name))
@@ -216,8 +228,9 @@ impl FieldFile {
         if !path.is_file() {
             return Err(damaged("its file is missing"));
         }
-        let file = StoreFile::open_repaired(path, cache_bytes, false)?;
+        let file = StoreFile::open_repaired(path, memory_bytes / 2, false)?;
         let mut open = Self::new(file, field.clone(), part.clone(), Vec::new(), Vec::new());
+        open.columns_bytes_max = memory_bytes / 2;
         open.summaries = open.blocks(part.summaries[0])?;
         open.over_tets = open.blocks(part.summaries[1])?;
         let n = field.components as usize;
@@ -291,7 +304,7 @@ impl FieldFile {
         let column = FieldColumn::from(words);
         self.columns_bytes += column.len() * 8;
         self.columns.put((chunk, component), Arc::clone(&column));
-        while self.columns_bytes > COLUMNS_BYTES_MAX && self.columns.len() > 1 {
+        while self.columns_bytes > self.columns_bytes_max && self.columns.len() > 1 {
             if let Some((_, old)) = self.columns.pop_lru() {
                 self.columns_bytes -= old.len() * 8;
             }
