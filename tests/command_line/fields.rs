@@ -286,3 +286,53 @@ fn questions_name_fields() {
         assert_eq!(error["code"], code, "{words}: {error}");
     }
 }
+
+/// Exports have the values at their places; what has none says so.
+#[test]
+fn exports_have_fields() {
+    let place = Place::new();
+    two(&place);
+    for line in [
+        "T --at vertices --from 300+x",
+        "u --at vertices --from x,y,z --type f32",
+        "mark --at tets --from round(10*x) --type i32",
+    ] {
+        place.run_line(&format!("field a.tetdb add {line}")).succeeds();
+    }
+    let done = place.run_line("export a.tetdb m.npy m.vtu m.pvtu m.vtkhdf m.msh").succeeds();
+    assert!(done.stderr().contains("m.msh is written without T, u, mark"), "{}", done.stderr());
+    assert_eq!(done.stderr().matches("is written without").count(), 1, "{}", done.stderr());
+    let points = doubles(&place, "m_points.npy");
+    let values = doubles(&place, "m_T.npy");
+    assert_eq!(values.len() * 3, points.len());
+    assert!(points.chunks(3).zip(&values).all(|(p, t)| *t == 300.0 + p[0]));
+    // What was exported comes back as it was.
+    for (name, at) in [("T", "vertices"), ("u", "vertices"), ("mark", "tets")] {
+        let again = format!("field a.tetdb add {name}_2 --at {at} --from m_{name}.npy");
+        place.run_line(&again).succeeds();
+        assert_eq!(digest(&place, name), digest(&place, &format!("{name}_2")));
+    }
+    for (file, words) in [
+        ("m.vtu", &["Name=\"u\" NumberOfComponents=\"3\"", "Float32", "Name=\"mark\""][..]),
+        ("m.pvtu", &["Name=\"u\" NumberOfComponents=\"3\"", "Name=\"T\"", "Name=\"mark\""]),
+        ("m.vtkhdf", &["mark"]),
+    ] {
+        let bytes = std::fs::read(place.path(file)).expect("it was written");
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(words.iter().all(|word| text.contains(word)), "{file}");
+    }
+    let second = place.run_line("export a.tetdb s.vtu --order 2").succeeds().stderr();
+    assert!(second.contains("without T, u, T_2, u_2:"), "{second}");
+    let info = place.run_line("info a.tetdb").succeeds().stdout();
+    assert!(info.contains("field T: f64 at vertices"), "{info}");
+    for color in ["T", "u.x", "mark"] {
+        place.run_line(&format!("snapshot a.tetdb a.svg --color {color}")).succeeds();
+    }
+    let line = "snapshot a.tetdb a.svg --color T --where mark>=5 --json";
+    let range = &place.run_line(line).succeeds().json()["quality"];
+    assert!(range[0].as_f64() > Some(300.4) && range[1].as_f64() < Some(301.1), "{range}");
+    for words in ["--color V", "--color u", "--surface --color T"] {
+        let error = place.run_line(&format!("snapshot a.tetdb a.svg {words} --json")).error();
+        assert_eq!(error["code"], "bad-query", "{words}");
+    }
+}

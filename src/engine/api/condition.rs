@@ -86,6 +86,19 @@ impl Store {
         Condition::located(text, self.condition(text)?)
     }
 
+    /// The component of a field with this name. Errors: `bad-query`.
+    pub(super) fn field_variable(&self, name: &str) -> Result<ExtraVariable, Error> {
+        let mut known = self.field_variables()?;
+        match known.iter().position(|(other, _)| other == name) {
+            Some(i) => Ok(known.swap_remove(i).1),
+            None => {
+                let names: Vec<&str> = known.iter().map(|(name, _)| &**name).collect();
+                let message = format!("{name}: expected a field, one of {}", names.join(", "));
+                Err(Error::new(Code::BadQuery, message))
+            }
+        }
+    }
+
     /// All components of fields, by the names that conditions have for them.
     pub(super) fn field_variables(&self) -> Result<Vec<(String, ExtraVariable)>, Error> {
         let fields = self.catalog_shared().fields()?.into_iter();

@@ -19,8 +19,8 @@ use tetdb_store::store::Catalog;
 const CACHE_BYTES: usize = 2 << 20;
 /// Least and greatest memory of a file being written, and of the sub-domain that it lines up with.
 const FILE_BYTES: [u64; 2] = [4 << 20, 64 << 20];
-/// Names of columns and constants of the language that no field can have.
-const RESERVED: [&str; 13] = [
+/// Names of columns, of arrays of exports and of words of the language, which no field can have.
+const RESERVED: [&str; 22] = [
     "id",
     "vertices",
     "points",
@@ -34,6 +34,15 @@ const RESERVED: [&str; 13] = [
     "true",
     "false",
     "pi",
+    "global_id",
+    "vertex_id",
+    "input_id",
+    "label",
+    "tets",
+    "triangles",
+    "connectivity",
+    "offsets",
+    "types",
 ];
 
 /// A field of a store.

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use tetdb_schema::field::{FieldPlace, FieldRow};
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
@@ -19,8 +20,27 @@ use tetdb_base::shape::excess_near;
 use tetdb_base::storage::{Sorted, check_cancelled};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::labels::LabelSet;
-use tetdb_store::sealed::{SealedError, Shape, Subdomain};
+use tetdb_store::sealed::{FieldFile, SealedError, Shape, Subdomain};
 use tetdb_store::store::Catalog;
+
+/// Memory of an open field: half for redb, half for decoded columns.
+const FIELD_BYTES: usize = 2 << 20;
+
+/// The values of some fields in a chunk, as words.
+struct FieldChunk(Vec<(usize, Vec<u64>)>);
+
+impl FieldChunk {
+    fn read(files: &mut [FieldFile], chunk: u32) -> Result<Self> {
+        let read =
+            |file: &mut FieldFile| Ok((file.field().components as usize, file.chunk(chunk)?));
+        Ok(Self(files.iter_mut().map(read).collect::<Result<_>>()?))
+    }
+
+    /// All numbers at a place.
+    fn row(&self, i: usize) -> Vec<u64> {
+        self.0.iter().flat_map(|(n, words)| &words[i * n..(i + 1) * n]).copied().collect()
+    }
+}
 
 /// Counts records and reports progress.
 pub(super) struct ReadProgress<'a> {
@@ -56,6 +76,8 @@ pub(super) struct MergedTet {
     pub quality: f64,
     /// Quality over the least quality that the tetrahedron's faces on the surface allow; NaN in a pass that does not measure it.
     pub excess: f64,
+    /// Words of the values of fields, where these are read.
+    pub fields: Vec<u64>,
 }
 
 /// Measures of tetrahedra in a pass.
@@ -102,6 +124,8 @@ pub(super) struct Merged<'a> {
     label_names: Vec<String>,
     pub(super) label_sets: Vec<LabelSet>,
     region_names: Vec<String>,
+    /// Fields at vertices and at tetrahedra that are read with them.
+    fields: [Vec<FieldRow>; 2],
     dir: PathBuf,
     memory: usize,
     progress: ReadProgress<'a>,
@@ -152,6 +176,7 @@ impl<'a> Merged<'a> {
             label_names,
             label_sets,
             region_names,
+            fields: Default::default(),
             dir: dir.to_owned(),
             memory,
             progress,
@@ -166,6 +191,24 @@ impl<'a> Merged<'a> {
         }
         mesh.embedded = embedded;
         Ok(mesh)
+    }
+
+    /// Reads the fields with all later passes, and returns those at vertices and at tetrahedra. Vertices that are not in the store
+    /// have no values, so with them fields at vertices are left out. Errors: damage.
+    pub fn read_fields(&mut self, has_more_vertices: bool) -> Result<[Vec<FieldRow>; 2]> {
+        let (vertices, tets) =
+            self.store.fields()?.into_iter().partition(|field| field.place == FieldPlace::Vertices);
+        self.fields = match has_more_vertices || self.doubles.is_some() {
+            true => [Vec::new(), tets],
+            false => [vertices, tets],
+        };
+        Ok(self.fields.clone())
+    }
+
+    /// Opens fields in a sub-domain.
+    fn open_fields(&mut self, fields: &[FieldRow], part: &Subdomain) -> Result<Vec<FieldFile>> {
+        let open = |field| Ok(self.store.open_field(field, part, FIELD_BYTES)?);
+        fields.iter().map(open).collect()
     }
 
     /// The written embedded edges and points.
@@ -362,11 +405,22 @@ impl<'a> Merged<'a> {
         &mut self,
         mut each: impl FnMut(u64, &SealedVertex) -> Result<()>,
     ) -> Result<()> {
+        self.vertices_with(&[], |number, vertex, _| each(number, vertex))
+    }
+
+    /// As [`Merged::vertices`], with the words of the values of fields, one after the other.
+    pub fn vertices_with(
+        &mut self,
+        fields: &[FieldRow],
+        mut each: impl FnMut(u64, &SealedVertex, &[u64]) -> Result<()>,
+    ) -> Result<()> {
         for p in self.window.clone() {
             let Source { row, .. } = &self.parts[p];
             let numbers = self.numbers_of(p)?;
+            let row = row.clone();
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
-            for chunk in part.vertex_chunks() {
+            let mut files = self.open_fields(fields, &part)?;
+            for (c, chunk) in (0..).zip(part.vertex_chunks()) {
                 let chunk = chunk?;
                 let end = u64::from(chunk.first) + chunk.records.len() as u64;
                 if end > row.vertices {
@@ -376,9 +430,10 @@ impl<'a> Merged<'a> {
                     );
                     return Err(part.damaged(what).into());
                 }
-                for (local, vertex) in (chunk.first..).zip(&chunk.records) {
-                    if let Some(number) = numbers.own(local) {
-                        each(number, vertex)?;
+                let values = FieldChunk::read(&mut files, c)?;
+                for (i, vertex) in chunk.records.iter().enumerate() {
+                    if let Some(number) = numbers.own(chunk.first + i as u32) {
+                        each(number, vertex, &values.row(i))?;
                     }
                 }
                 self.progress.advance(chunk.records.len());
@@ -386,7 +441,9 @@ impl<'a> Merged<'a> {
         }
         let first = self.numbering.n_vertices();
         match &self.doubles {
-            Some(doubles) => doubles.each(|place, double| each(first + place, &double.sealed())),
+            Some(doubles) => {
+                doubles.each(|place, double| each(first + place, &double.sealed(), &[]))
+            }
             None => Ok(()),
         }
     }
@@ -404,9 +461,11 @@ impl<'a> Merged<'a> {
     ) -> Result<()> {
         let mut changes = self.doubles.as_ref().map(Doubles::changes).transpose()?;
         for p in self.window.clone() {
-            let Source { row, .. } = &self.parts[p];
+            let row = self.parts[p].row.clone();
             let numbers = self.numbers_of(p)?;
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
+            let fields = self.fields[1].clone();
+            let mut files = self.open_fields(&fields, &part)?;
             let mut on_surface = match measured {
                 Measured::Nothing | Measured::Quality => None,
                 Measured::Excess => {
@@ -415,8 +474,9 @@ impl<'a> Merged<'a> {
                 }
             };
             let mut expected = 0;
-            for chunk in 0..part.tet_summaries().len() {
-                let chunk = part.tet_chunk(chunk as u32)?;
+            for c in 0..part.tet_summaries().len() {
+                let chunk = part.tet_chunk(c as u32)?;
+                let values = FieldChunk::read(&mut files, c as u32)?;
                 for (local, tet) in (chunk.first..).zip(&chunk.records) {
                     let id = TetId::new(part.id(), local)
                         .filter(|_| local == expected && u64::from(local) < row.tets);
@@ -448,6 +508,7 @@ impl<'a> Merged<'a> {
                         id,
                         quality,
                         excess,
+                        fields: values.row((local - chunk.first) as usize),
                     })?;
                 }
                 self.progress.advance(chunk.records.len());
