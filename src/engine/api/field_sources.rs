@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use super::fields::{NewField, Words, bad, packed};
+use super::field_spec::{NewField, Words, bad, packed};
 use super::{Error, ExprError, Settings, VARIABLES};
 use tetdb_base::expr::{ExprKind, Expression};
 use tetdb_base::storage::{DiskPath, SortRecord, Sorted, Sorter, check_cancelled, sort_record};

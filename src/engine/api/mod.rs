@@ -16,7 +16,7 @@
 //! | `store`, `info`, `names`, `located`, `compare` | a finished store; records; names; points in tetrahedra; two meshes compared |
 //! | `verify`, `verify_shared`, `verify_server` | verification, by one or several processes |
 //! | `ask`, `condition`, `answer_rows`, `answer_file` | questions and their answers |
-//! | `fields`, `field_sources` | values kept with a finished mesh |
+//! | `fields`, `field_spec`, `field_sources` | values kept with a finished mesh |
 //! | `remesh`, `remesh_sizes` | meshing sub-domains again |
 //! | `tasks`, `tasks_status` | one mesh by the tasks of a batch scheduler |
 //! | `mpi` | one mesh by the ranks of an MPI program |
@@ -34,6 +34,7 @@ mod defects;
 pub mod error;
 mod field_arrays;
 mod field_sources;
+mod field_spec;
 mod fields;
 mod from_errors;
 mod guard;
@@ -89,7 +90,8 @@ pub use condition::{Condition, ExprError, VARIABLES};
 pub use defects::DefectPlace;
 pub use error::Error;
 pub use field_sources::{FieldIds, FieldSource};
-pub use fields::{Field, FieldNumber, FieldPlace, FieldReader, FieldValues, NewField, Scalar};
+pub use field_spec::NewField;
+pub use fields::{Field, FieldNumber, FieldPlace, FieldReader, FieldValues, Scalar};
 #[doc(hidden)]
 pub use guard::guarded;
 pub use info::{EmbeddedInfo, RegionInfo, StageInfo, StoreInfo, SubdomainInfo};

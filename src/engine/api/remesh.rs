@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::preflight::scratch_beside;
 use super::remesh_sizes::{Lengths, RemeshSizes};
 use super::store::{open_finished, open_to_change};
-use super::{Error, Settings, Sizes, Store, Surface, fields, guarded, job, verify};
+use super::{Error, Settings, Sizes, Store, Surface, field_spec, fields, guarded, job, verify};
 use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Values};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_store::audit::Level;
@@ -296,7 +296,7 @@ fn settle_fields(open: &mut Catalog, drop: bool) -> Result<(), Error> {
         "the store has fields ({}), whose values belong to the mesh as it is",
         names.join(", ")
     );
-    Err(fields::bad(message).with_help("drop the fields first, and add them again afterwards"))
+    Err(field_spec::bad(message).with_help("drop the fields first, and add them again afterwards"))
 }
 
 /// A repair must follow the recipe that began the store. Any other change only reports that the recipe differs.

@@ -1,6 +1,5 @@
 //! Sub-domains of a store as one mesh, streamed.
 
-use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -13,56 +12,17 @@ use super::doubles::Doubles;
 use super::embedded::{WrittenEmbedded, memory_left};
 use super::error::{Result, WriteError};
 use super::faces::{FaceSorter, FaceSource, MergedFace, MergedFaces};
+use super::merged_fields::{FieldChunk, open_fields};
 use super::merged_parts::{collect_faces, misplaced, required_faces, sources};
 use super::numbering::{Numbering, PartNumbers, Sharer, Source, shareable_vertices, sharers};
+use super::read_progress::ReadProgress;
 use super::scope::{FaceSet, Scope};
 use tetdb_base::shape::excess_near;
-use tetdb_base::storage::{Sorted, check_cancelled};
+use tetdb_base::storage::Sorted;
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::labels::LabelSet;
-use tetdb_store::sealed::{FieldFile, SealedError, Shape, Subdomain};
+use tetdb_store::sealed::{SealedError, Shape, Subdomain};
 use tetdb_store::store::Catalog;
-
-/// Memory of an open field: half for redb, half for decoded columns.
-const FIELD_BYTES: usize = 2 << 20;
-
-/// The values of some fields in a chunk, as words.
-struct FieldChunk(Vec<(usize, Vec<u64>)>);
-
-impl FieldChunk {
-    fn read(files: &mut [FieldFile], chunk: u32) -> Result<Self> {
-        let read =
-            |file: &mut FieldFile| Ok((file.field().components as usize, file.chunk(chunk)?));
-        Ok(Self(files.iter_mut().map(read).collect::<Result<_>>()?))
-    }
-
-    /// All numbers at a place.
-    fn row(&self, i: usize) -> Vec<u64> {
-        self.0.iter().flat_map(|(n, words)| &words[i * n..(i + 1) * n]).copied().collect()
-    }
-}
-
-/// Counts records and reports progress.
-pub(super) struct ReadProgress<'a> {
-    report: &'a dyn Fn(u64, u64),
-    done: Cell<u64>,
-    total: Cell<u64>,
-}
-
-impl<'a> ReadProgress<'a> {
-    pub fn new(report: &'a dyn Fn(u64, u64)) -> Self {
-        let (done, total) = (Cell::new(0), Cell::new(0));
-        Self { report, done, total }
-    }
-
-    /// Counts `n` more records; unwinds when the run is cancelled.
-    fn advance(&self, n: usize) {
-        check_cancelled();
-        let done = self.done.get() + n as u64;
-        self.done.set(done);
-        (self.report)(done, self.total.get().max(done));
-    }
-}
 
 /// A tetrahedron of the merged mesh.
 pub(super) struct MergedTet {
@@ -203,12 +163,6 @@ impl<'a> Merged<'a> {
             false => [vertices, tets],
         };
         Ok(self.fields.clone())
-    }
-
-    /// Opens fields in a sub-domain.
-    fn open_fields(&mut self, fields: &[FieldRow], part: &Subdomain) -> Result<Vec<FieldFile>> {
-        let open = |field| Ok(self.store.open_field(field, part, FIELD_BYTES)?);
-        fields.iter().map(open).collect()
     }
 
     /// The written embedded edges and points.
@@ -419,7 +373,7 @@ impl<'a> Merged<'a> {
             let numbers = self.numbers_of(p)?;
             let row = row.clone();
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
-            let mut files = self.open_fields(fields, &part)?;
+            let mut files = open_fields(self.store, fields, &part)?;
             for (c, chunk) in (0..).zip(part.vertex_chunks()) {
                 let chunk = chunk?;
                 let end = u64::from(chunk.first) + chunk.records.len() as u64;
@@ -465,7 +419,7 @@ impl<'a> Merged<'a> {
             let numbers = self.numbers_of(p)?;
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
             let fields = self.fields[1].clone();
-            let mut files = self.open_fields(&fields, &part)?;
+            let mut files = open_fields(self.store, &fields, &part)?;
             let mut on_surface = match measured {
                 Measured::Nothing | Measured::Quality => None,
                 Measured::Excess => {

@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 
 use super::columns::Number;
 use super::dispatch;
-use super::merged::{Merged, ReadProgress};
+use super::merged::Merged;
 use super::output_files::OutputFiles;
+use super::read_progress::ReadProgress;
 use super::scope::{FaceSet, Scope};
 use super::stream::Stream;
 use super::{ExportSelection, FileCounts, MeshFormat, Result, WriteError, vtk};

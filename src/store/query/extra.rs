@@ -3,17 +3,13 @@
 use tetdb_schema::field::{FieldPlace, FieldRow, Scalar};
 use tetdb_schema::record::SealedTet;
 
+use super::session::OpenField;
 use super::{QueryError, QuerySession};
 use crate::sealed::FieldFile;
-use tetdb_base::storage::Lease;
-
 /// Memory of the open file of a field: half for redb, half for decoded columns.
 const FILE_BYTES: u64 = 2 << 20;
 /// Files of fields held open.
 const FILES_MAX: usize = 12;
-/// Most numbers of fields in one answer.
-pub const EXTRA_MAX: usize = 9;
-
 /// A variable beyond [`VARIABLES`](super::VARIABLES).
 #[derive(Clone, Debug, PartialEq)]
 pub enum ExtraVariable {
@@ -21,12 +17,6 @@ pub enum ExtraVariable {
     Number(f64),
     /// A component of a field. Of a field at vertices, the mean over the vertices of the tetrahedron.
     Field(FieldRow, u32),
-}
-
-/// An open file of a field.
-pub(super) struct OpenField {
-    file: FieldFile,
-    _lease: Lease,
 }
 
 /// Ranges of some variables in the chunks of a sub-domain, and whether some of their values are not numbers.
@@ -56,7 +46,7 @@ impl QuerySession {
             self.part(rank)?;
             let part = self.parts.peek(&rank).expect("it was just opened");
             let file = self.store.open_field(field, &part.subdomain, FILE_BYTES as usize)?;
-            self.fields.put(key, OpenField { file, _lease: lease });
+            self.fields.put(key, OpenField::new(file, lease));
         }
         Ok(&mut self.fields.get_mut(&key).expect("it was just put there").file)
     }

@@ -3,7 +3,6 @@
 use tetdb_schema::field::Scalar;
 use tetdb_schema::ids::TetId;
 
-use super::EXTRA_MAX;
 use crate::sealed::Shape;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::shape::excess;
@@ -26,6 +25,9 @@ pub const VARIABLES: [&str; 12] = [
     "angle_max",
     "excess",
 ];
+
+/// Most numbers of fields in one answer.
+pub const EXTRA_MAX: usize = 9;
 
 /// The place of `excess` among the [`VARIABLES`]: the one that needs the surface.
 pub(super) const EXCESS: usize = VARIABLES.len() - 1;

@@ -29,8 +29,8 @@ mod surface_faces;
 mod tree;
 
 pub use error::QueryError;
-pub use extra::{EXTRA_MAX, ExtraVariable};
-pub use hit::{Hit, VARIABLES};
+pub use extra::ExtraVariable;
+pub use hit::{EXTRA_MAX, Hit, VARIABLES};
 pub use locate::LocatedPoint;
 pub use order::Ordered;
 pub use select::Selected;

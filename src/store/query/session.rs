@@ -9,10 +9,9 @@ use tetdb_schema::record::SealedTet;
 
 use super::QueryError;
 use super::decoded::{DecodedChunk, Searched};
-use super::extra::OpenField;
 use super::surface_faces::SurfaceFaces;
 use super::tree::OctalBoxTree;
-use crate::sealed::{Chunk, Subdomain};
+use crate::sealed::{Chunk, FieldFile, Subdomain};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Budget, Lease, check_cancelled};
@@ -49,6 +48,19 @@ pub struct OpenSubdomain {
     /// Over the boxes of its chunks of tetrahedra.
     pub(super) tree: OctalBoxTree,
     _lease: Option<Lease>,
+}
+
+/// An open file of a field.
+pub(super) struct OpenField {
+    pub file: FieldFile,
+    _lease: Lease,
+}
+
+impl OpenField {
+    /// A file whose memory is leased.
+    pub fn new(file: FieldFile, lease: Lease) -> Self {
+        Self { file, _lease: lease }
+    }
 }
 
 /// A store open for questions.
