@@ -127,6 +127,24 @@ impl Store {
     /// Adds a field with values that `fill` gives for each chunk: those of the sub-domain's vertices or tetrahedra, by number. Type and
     /// components must be set, or are `f64` and 1.
     ///
+    /// ```
+    /// # use tetdb_engine::api as tetdb;
+    /// # let dir = tempfile::tempdir()?;
+    /// # let path = dir.path().join("box.tetdb");
+    /// # let mut store = tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.2")?).create(&path)?;
+    /// use tetdb::{FieldPlace, FieldValues, NewField};
+    ///
+    /// let height = NewField::new("height", FieldPlace::Vertices);
+    /// store.add_field(&height, |mesh, chunk| {
+    ///     let vertices = mesh.vertex_chunk(chunk)?.records;
+    ///     Ok(FieldValues::F64(vertices.iter().map(|vertex| vertex.point[2]).collect()))
+    /// })?;
+    /// assert!(store.query().where_("height > 0.9")?.answers()?.next().is_some());
+    /// let mut values = store.field("height", 0)?;
+    /// assert!(values.n_chunks() > 0 && values.chunk(0).is_ok());
+    /// store.drop_field("height")?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     /// Errors: `bad-field`, also for a vertex that has another value in another sub-domain; those of `fill`.
     pub fn add_field(
         &mut self,
