@@ -164,6 +164,7 @@ pub struct SubdomainRow {
 
 const SUBDOMAIN: &str = "subdomain";
 const COARSE: &str = "coarse";
+const FIELD: &str = "field";
 
 /// A current file of the store: the working or sealed mesh of a sub-domain in one generation.
 #[derive(
@@ -195,6 +196,16 @@ impl FileRow {
     /// Name of the file of a coarse snapshot.
     pub fn coarse_name(self) -> String {
         self.name(COARSE)
+    }
+
+    /// Name of the file of a field's values in a sub-domain; the generation is the file's serial number.
+    pub fn field_name(self) -> String {
+        self.name(FIELD)
+    }
+
+    /// The inverse of [`FileRow::field_name`].
+    pub fn from_field_name(name: &str) -> Option<Self> {
+        Self::from_name(FIELD, name)
     }
 
     /// The inverse of [`FileRow::subdomain_name`].

@@ -8,6 +8,7 @@ pub mod catalog;
 pub mod chunk;
 pub mod code;
 pub mod digest;
+pub mod field;
 pub mod ids;
 pub mod labels;
 pub mod page;

@@ -52,11 +52,17 @@ pub enum RowKind {
     Embedded = 79,
     /// Vector of [`LabelSet`](crate::labels::LabelSet), ascending by label.
     LabelSets = 80,
+    /// [`FieldRow`](crate::field::FieldRow) (0, number of the field).
+    Field = 81,
+    /// [`FieldPart`](crate::field::FieldPart) (number of the field, rank).
+    FieldPart = 82,
+    /// [`FieldPart`](crate::field::FieldPart) before the last change of the sub-domain (number of the field, rank).
+    PreviousFieldPart = 83,
 }
 
 impl RowKind {
     /// All kinds, by number.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 20] = [
         Self::Format,
         Self::State,
         Self::Job,
@@ -74,6 +80,9 @@ impl RowKind {
         Self::RegionNames,
         Self::Embedded,
         Self::LabelSets,
+        Self::Field,
+        Self::FieldPart,
+        Self::PreviousFieldPart,
     ];
 
     /// The kind of a key; `None` for a key of no row.

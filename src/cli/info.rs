@@ -122,6 +122,9 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     print_bytes(&info, console);
     print_subdomains(&info, console);
     print_regions(&info.regions, &info.labels, console);
+    for field in &info.fields {
+        console.line(&format!("field {}", super::field::line(field)));
+    }
     for line in quality_lines(&info.quality()) {
         console.line(&line);
     }

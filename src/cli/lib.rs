@@ -12,6 +12,7 @@ mod digest;
 mod estimate;
 mod export;
 mod failure;
+mod field;
 mod heap;
 mod info;
 mod input;
@@ -199,6 +200,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Check(args) => check::run(args, console),
         Command::Info(args) => info::run(args, console),
         Command::Query(args) => query::run(args, console),
+        Command::Field(args) => field::run(args, console),
         Command::Verify(args) => verify::run(args, console),
         Command::Compare(args) => compare::run(args, console),
         Command::Digest(args) => digest::run(args, console),
@@ -223,5 +225,6 @@ fn writes_files(command: &Command) -> bool {
             | Command::Snapshot(_)
             | Command::Report(_)
             | Command::Query(_)
+            | Command::Field(_)
     )
 }

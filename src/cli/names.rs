@@ -25,6 +25,7 @@ pub fn names(command: &Command) -> Vec<(&'static str, String)> {
         Command::Info(a) => (Some(a.of.store.clone()), None),
         Command::Digest(a) => (Some(a.store.clone()), None),
         Command::Query(a) => (Some(a.store.clone()), None),
+        Command::Field(a) => (Some(a.store.clone()), None),
         Command::Verify(a) => (Some(a.store.clone()), None),
         Command::Export(a) => (Some(a.store.clone()), None),
         Command::Snapshot(a) => (Some(a.store.clone()), None),

@@ -30,9 +30,9 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
         check_target(out, &inputs.collect::<Vec<_>>())?;
     }
     let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
-    let columns = columns(args)?;
-    let order = order(args)?;
     let mut store = Store::open_with(&args.store, settings.clone())?;
+    let columns = columns(args, &store)?;
+    let order = order(args, &store)?;
     let mut writer = writer(args, columns.clone(), &settings, console)?;
     let n = match args.point.is_empty() && args.points.is_none() {
         true => select(args, &mut store, (columns, order), &mut writer)?,
@@ -57,7 +57,7 @@ fn select(
     (columns, order): (Vec<AnswerColumn>, Option<(&str, Order)>),
     writer: &mut Writer,
 ) -> Result<u64, Failure> {
-    let mut query = query(args, store)?;
+    let mut query = query(args, store)?.with_columns(&columns)?;
     if columns.contains(&AnswerColumn::Variable(EXCESS)) {
         query = query.with_excess();
     }
@@ -132,7 +132,7 @@ fn report_count(
     Ok(())
 }
 
-fn columns(args: &QueryArgs) -> Result<Vec<AnswerColumn>, Failure> {
+fn columns(args: &QueryArgs, store: &Store) -> Result<Vec<AnswerColumn>, Failure> {
     let of_points = !args.point.is_empty() || args.points.is_some();
     let default = match args.json || args.output.is_some() {
         true => "id,subdomain,region,quality,volume,vertices,points",
@@ -140,15 +140,19 @@ fn columns(args: &QueryArgs) -> Result<Vec<AnswerColumn>, Failure> {
         false => "id,subdomain,region,quality,x,y,z",
     };
     let names = args.select.as_deref().unwrap_or(default);
-    let columns = names.split(',').map(|name| {
-        let name = name.trim();
-        let known = || format!("columns among id, vertices, points, {}", VARIABLES.join(", "));
-        AnswerColumn::from_name(name).ok_or_else(|| bad("--select", name, &known()))
+    let names: Vec<&str> = names.split(',').map(str::trim).collect();
+    let found = store.answer_columns(&names)?;
+    let columns = names.iter().zip(found).map(|(name, column)| {
+        let known = format!("columns among id, vertices, points, {}", variables(store)?.join(", "));
+        column.ok_or_else(|| bad("--select", name, &known))
     });
     let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
     if of_points {
         if columns.contains(&AnswerColumn::Variable(EXCESS)) {
             return Err(bad("--select", "excess", "no excess where points are asked for"));
+        }
+        if let Some(field) = columns.iter().find(|c| matches!(c, AnswerColumn::Field { .. })) {
+            return Err(bad("--select", field.name(), "no field where points are asked for"));
         }
         columns.insert(0, AnswerColumn::Point);
         columns.push(AnswerColumn::Barycentric);
@@ -156,14 +160,21 @@ fn columns(args: &QueryArgs) -> Result<Vec<AnswerColumn>, Failure> {
     Ok(columns)
 }
 
+/// Names of all numbers of a tetrahedron.
+fn variables(store: &Store) -> Result<Vec<String>, Failure> {
+    let fields = store.fields()?.into_iter().flat_map(|field| field.columns);
+    Ok(VARIABLES.iter().map(|name| (*name).to_owned()).chain(fields).collect())
+}
+
 /// The variable by which answers are sorted, and the order.
-fn order(args: &QueryArgs) -> Result<Option<(&str, Order)>, Failure> {
+fn order<'a>(args: &'a QueryArgs, store: &Store) -> Result<Option<(&'a str, Order)>, Failure> {
     let Some(text) = &args.order_by else {
         return Ok(None);
     };
     let name = text.trim_start_matches('-');
-    if !VARIABLES.contains(&name) {
-        let known = format!("one of {}", VARIABLES.join(", "));
+    let known = variables(store)?;
+    if !known.iter().any(|known| known == name) {
+        let known = format!("one of {}", known.join(", "));
         return Err(bad("--order-by", text, &known));
     }
     let order = match text.starts_with('-') != args.desc {

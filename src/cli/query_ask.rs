@@ -58,6 +58,7 @@ pub fn query<'s>(args: &QueryArgs, store: &'s mut Store) -> Result<Query<'s>, Fa
         text.split(',').map(|name| summary.label_called(name.trim())).collect::<Result<Vec<_>, _>>()
     });
     let labels = labels.transpose()?;
+    let condition = args.condition.as_ref().map(|text| condition(text, store)).transpose()?;
     let mut query = places(args, store.query())?;
     if args.inside {
         query = query.inside();
@@ -87,8 +88,8 @@ pub fn query<'s>(args: &QueryArgs, store: &'s mut Store) -> Result<Query<'s>, Fa
     if let Some(text) = &args.tet {
         query = query.among(&list("--tet", text, "tetrahedra such as 7:1048211")?);
     }
-    if let Some(text) = &args.condition {
-        query = query.condition(condition(text)?);
+    if let Some(condition) = condition {
+        query = query.condition(condition);
     }
     if let Some(text) = &args.neighbors {
         let id = text.parse();
@@ -151,7 +152,7 @@ fn places<'s>(args: &QueryArgs, mut query: Query<'s>) -> Result<Query<'s>, Failu
     Ok(query)
 }
 
-/// Parses a condition on the variables of a query.
-pub fn condition(text: &str) -> Result<Condition, Failure> {
-    Condition::parse(text).map_err(|error| bad_expression(text, &error))
+/// Parses a condition on the variables of a query and the fields of the store.
+pub fn condition(text: &str, store: &Store) -> Result<Condition, Failure> {
+    store.condition(text)?.map_err(|error| bad_expression(text, &error))
 }

@@ -46,7 +46,7 @@ fn line(columns: &[AnswerColumn], row: Option<&AnswerRow>) -> String {
             AnswerColumn::Vertices => 48,
             AnswerColumn::Points => 120,
             _ if column.is_integer() => 9,
-            AnswerColumn::Variable(_) => 12,
+            AnswerColumn::Variable(_) | AnswerColumn::Field { .. } => 12,
         };
         line += &format!("{text:>width$}  ");
     }

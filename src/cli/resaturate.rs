@@ -35,6 +35,7 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
         _ => remesh.subdomains(&args.subdomain),
     };
     let remesh = with_sizes(args, remesh)?;
+    let remesh = if args.drop_fields { remesh.drop_fields() } else { remesh };
     if args.dry_run {
         let list = remesh.forecast()?;
         match list.is_empty() {

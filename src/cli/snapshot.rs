@@ -5,18 +5,18 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::query_ask::{bad, condition, numbers};
-use tetdb_engine::api::{Code, ColorBy, Snapped, Snapshot, Store};
+use tetdb_engine::api::{Code, ColorBy, Snapped, Snapshot, Store, Word};
 
 /// Least and greatest width or height of a picture, in pixels.
 const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;
 
 pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
     let settings = console.settings(memory::requested(args.read.memory.as_deref())?, None);
-    let snapshot = snapshot(args).map_err(|error| match error.code {
+    let store = Store::open_with(&args.store, settings)?;
+    let snapshot = snapshot(args, &store).map_err(|error| match error.code {
         Code::BadQuery => error.help("`tetdb snapshot --help` has examples"),
         _ => error,
     })?;
-    let store = Store::open_with(&args.store, settings)?;
     let snapped = store.snapshot(&args.output, &snapshot).map_err(|error| {
         match (error.code(), &args.plane) {
             (Code::BadQuery, Some(plane)) => {
@@ -31,22 +31,37 @@ pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
 }
 
 /// The requested picture. Errors: options that make no sense.
-fn snapshot(args: &SnapshotArgs) -> Result<Snapshot, Failure> {
+fn snapshot(args: &SnapshotArgs, store: &Store) -> Result<Snapshot, Failure> {
     let [width, height] = pixels(&args.size)?;
     let (mut snapshot, in_space) = subject(args)?;
     if let (Some(from), false) = (&args.from, in_space) {
         let expected = "a picture in space: --surface, --shell, or an interface with --stage";
         return Err(bad("--from", from, expected));
     }
-    if in_space && matches!(args.color, ColorBy::Quality) {
+    let color = ColorBy::from_word(&args.color);
+    if in_space && color == Some(ColorBy::Quality) {
         let expected = "subdomain, region, size or label, for faces have no quality";
         return Err(bad("--color", "quality", expected));
     }
-    if !in_space && matches!(args.color, ColorBy::Label) {
+    if !in_space && color == Some(ColorBy::Label) {
         let expected = "with --surface or --shell, for tetrahedra have no label";
         return Err(bad("--color", "label", expected));
     }
-    snapshot = snapshot.pixels(width, height).color(args.color);
+    snapshot = snapshot.pixels(width, height);
+    snapshot = match color {
+        Some(color) => snapshot.color(color),
+        None => {
+            let fields: Vec<String> =
+                store.fields()?.into_iter().flat_map(|field| field.columns).collect();
+            if in_space || !fields.contains(&args.color) {
+                let words = ColorBy::WORDS.iter().map(|(_, word)| (*word).to_owned());
+                let words: Vec<String> =
+                    words.chain(fields.into_iter().filter(|_| !in_space)).collect();
+                return Err(bad("--color", &args.color, &format!("one of {}", words.join(", "))));
+            }
+            snapshot.color_field(&args.color)
+        }
+    };
     if let Some(text) = &args.plane {
         let expected = "six numbers, a point and a direction towards the viewer";
         let [x, y, z, nx, ny, nz] = numbers("--plane", text, expected)?;
@@ -64,7 +79,7 @@ fn snapshot(args: &SnapshotArgs) -> Result<Snapshot, Failure> {
         snapshot = snapshot.seen_from(from);
     }
     if let Some(text) = &args.condition {
-        snapshot = snapshot.condition(condition(text)?);
+        snapshot = snapshot.condition(condition(text, store)?);
     }
     Ok(match args.crinkle {
         true => snapshot.crinkle(),

@@ -9,6 +9,7 @@
 //! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |
 //! | [`cluster`] | share a mesh among the machines of a cluster |
 //! | [`questions`] | find tetrahedra by place, condition or neighborhood |
+//! | [`fields`] | keep values at vertices and tetrahedra, ask for them, export them |
 //! | [`resaturation`] | mesh some sub-domains again, with other sizes or after damage |
 //! | [`pictures`] | draw cuts and surfaces |
 //! | [`exports`] | files for VTK, OpenFOAM, Gmsh, NumPy, DuckDB and others |
@@ -28,6 +29,7 @@ macro_rules! links {
             "[subdomains]: crate::guide::subdomains\n",
             "[cluster]: crate::guide::cluster\n",
             "[questions]: crate::guide::questions\n",
+            "[fields]: crate::guide::fields\n",
             "[resaturation]: crate::guide::resaturation\n",
             "[pictures]: crate::guide::pictures\n",
             "[exports]: crate::guide::exports\n",
@@ -75,6 +77,10 @@ pub mod cluster {
 pub mod questions {
     #![doc = links!()]
     #![doc = include_str!("questions.md")]
+}
+pub mod fields {
+    #![doc = links!()]
+    #![doc = include_str!("fields.md")]
 }
 pub mod resaturation {
     #![doc = links!()]

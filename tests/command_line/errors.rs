@@ -27,6 +27,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("task-file", "tasks.rs"),
     ("invalid-mesh", "below"),
     ("contradicting-orientation", "walls.rs"),
+    ("bad-field", "fields.rs"),
     ("bad-seed", "seeds.rs"),
     ("sheet-outside", "sheets.rs"),
     ("wire-outside", "wires.rs"),

@@ -163,6 +163,7 @@ chapters! {
     subdomains: 5,
     cluster: 8,
     questions: 8,
+    fields: 8,
     resaturation: 5,
     pictures: 10,
     exports: 8,

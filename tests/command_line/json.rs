@@ -14,7 +14,7 @@ const PAGE: &str = include_str!("../../src/guide/scripting.md");
 const FREE: [&str; 4] = ["options", "subdomains[].sizes.options", "findings", "measures.chunks"];
 
 /// The commands of each section, in order. The surfaces are written first.
-const RUNS: [(&str, &[&str]); 18] = [
+const RUNS: [(&str, &[&str]); 19] = [
     ("sample", &["sample box,h=0.045 -o box.stl", "sample sphere,h=0.2 -o sphere.stl"]),
     (
         "check",
@@ -58,6 +58,14 @@ const RUNS: [(&str, &[&str]); 18] = [
             "query a.tetdb --point 0.1,0.2,0.3 --point 7,7,7",
             "query a.tetdb --tet 0:5",
             "query a.tetdb --tet 0:5 --select id,x,y,z,edge_min,edge_max,angle_min,angle_max,excess",
+        ],
+    ),
+    (
+        "field",
+        &[
+            "field a.tetdb add T --at vertices --from x",
+            "field a.tetdb list",
+            "field a.tetdb drop T",
         ],
     ),
     ("snapshot", &["snapshot a.tetdb a.svg"]),

@@ -7,6 +7,7 @@ mod crash;
 mod damage;
 mod errors;
 mod exports;
+mod fields;
 mod forms;
 mod groups;
 mod guide;

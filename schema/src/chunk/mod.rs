@@ -13,11 +13,13 @@ mod records;
 mod summaries;
 #[cfg(test)]
 mod tests;
+mod values;
 
 pub use codec::{Decoder, Encoder};
 pub use columns::{ColumnWriter, Malformed};
 pub use packer::{PackedChunk, Packer};
-pub use summaries::{RangeSummary, TetSummary, VertexSummary, is_box};
+pub use summaries::{FieldSummary, RangeSummary, TetSummary, VertexSummary, is_box};
+pub use values::FieldWord;
 
 use thiserror::Error;
 
@@ -57,6 +59,12 @@ pub enum ChunkKind {
     CoarseFacets = 51,
     /// Interface faces of a coarse snapshot.
     CoarseFaces = 52,
+    /// Numbers of a field.
+    FieldValues = 57,
+    /// Summaries of chunks of a field.
+    FieldSummaries = 58,
+    /// Ranges of a field at vertices, of the chunks of tetrahedra.
+    FieldTetSummaries = 59,
 }
 
 impl ChunkKind {

@@ -204,3 +204,37 @@ impl<const INTERFACE: bool> ChunkRecord for RangeSummary<INTERFACE> {
     const COUNT_MAX: usize = 16_384;
     fixed_fields! { |_: &Self| true; first, count }
 }
+
+/// Summary of one component of a field in a chunk; 64 bytes. With `AT_TETS`, the range of a field at vertices over the tetrahedra of a chunk.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldSummary<const AT_TETS: bool> {
+    /// Number of the first value.
+    pub first: u32,
+    /// Number of values.
+    pub count: u32,
+    /// The first of its stored pieces.
+    pub piece: u32,
+    /// Number of its pieces.
+    pub pieces: u32,
+    /// Number of values that are not numbers.
+    pub nan: u32,
+    /// Least value; infinite where none is a number.
+    pub low: f64,
+    /// Greatest value.
+    pub high: f64,
+}
+
+impl<const AT_TETS: bool> FieldSummary<AT_TETS> {
+    /// Bytes of a summary.
+    pub const BYTES: usize = 64;
+}
+
+impl<const AT_TETS: bool> ChunkRecord for FieldSummary<AT_TETS> {
+    const KIND: ChunkKind =
+        if AT_TETS { ChunkKind::FieldTetSummaries } else { ChunkKind::FieldSummaries };
+    const COUNT_MAX: usize = 4096;
+    fixed_fields! {
+        |summary: &Self| !summary.low.is_nan() && !summary.high.is_nan();
+        first, count, piece, pieces, nan, low, high
+    }
+}

@@ -113,6 +113,17 @@ fn coarse_faces(n: u32) -> Vec<CoarseFace> {
         .collect()
 }
 
+/// Numbers near each other, of either sign, and some of any bits.
+fn words(n: u32) -> Vec<FieldWord> {
+    let mut next = random(9);
+    let smooth = |i: u32| (f64::from(i) * 1e-3).sin().to_bits();
+    (0..n).map(|i| FieldWord(if i % 50 == 0 { next() } else { smooth(i) })).collect()
+}
+
+fn field_summary() -> FieldSummary<false> {
+    FieldSummary { first: 7, count: 9, piece: 3, pieces: 2, nan: 1, low: -0.5, high: 3.0 }
+}
+
 fn pack<R: ChunkRecord>(records: &[R]) -> Vec<PackedChunk<R>> {
     let mut packer = Packer::new(5, 2).expect("a zstd context");
     let mut chunks = Vec::new();
@@ -149,6 +160,7 @@ fn every_kind_comes_back() {
         come_back(&coarse_vertices(n));
         come_back(&coarse_facets(n));
         come_back(&coarse_faces(n));
+        come_back(&words(n));
     }
     let summary = TetSummary {
         bounds: [[0.1; 3], [0.9; 3]],
@@ -166,6 +178,7 @@ fn every_kind_comes_back() {
     let bounds = [[0.5; 3]; 2];
     come_back(&vec![VertexSummary { bounds, first: 0, count: 9, cells: 5 << 40 }; 5000]);
     come_back(&vec![RangeSummary::<true> { first: 0, count: 9 }; 50]);
+    come_back(&vec![field_summary(); 5000]);
 }
 
 #[test]
@@ -228,6 +241,8 @@ fn damage_is_an_error() {
     damage(&vertices(500));
     damage(&facets(500));
     damage(&faces(500));
+    damage(&words(2000));
+    damage(&[field_summary(); 40]);
     let bounds = [[0.5; 3]; 2];
     damage(&[VertexSummary { bounds, first: 0, count: 9, cells: 5 << 40 }; 40]);
 }

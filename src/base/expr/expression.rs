@@ -58,7 +58,12 @@ impl Expression {
     ///
     /// False is certain, true is not. Panics as [`Expression::truth`].
     pub fn may_hold(&self, ranges: &[[f64; 2]]) -> bool {
+        self.may_hold_with(ranges, &[])
+    }
+
+    /// Like [`Expression::may_hold`], where some variables may also not be numbers.
+    pub fn may_hold_with(&self, ranges: &[[f64; 2]], nan: &[bool]) -> bool {
         assert_eq!(self.kind, ExprKind::Truth, "a number is no truth");
-        ranges::may_hold(&self.ops, &self.lists, ranges)
+        ranges::may_hold(&self.ops, &self.lists, ranges, nan)
     }
 }

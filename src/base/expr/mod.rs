@@ -5,7 +5,7 @@
 //! | numbers | `2`, `.5`, `1e-3`, `pi`, and the variables of the place |
 //! | arithmetic | `+ - * /`, `^` (a power, to the right: `2^3^2 = 2^9`), `-x` (after `^`: `-2^2 = -4`) |
 //! | comparison | `= != < <= > >=` (also `==`), not chained; `region in [1, 4, 9]` |
-//! | truths | `true`, `false`, `not`, then `and`, then `or` |
+//! | truths | `true`, `false`, `not`, then `and` (also `&&`), then `or` (also `||`) |
 //! | functions | `abs ceil cos exp floor log` (natural) `max min pow round sign sin sqrt tan`, `if(truth, number, number)` |
 //!
 //! Both sides of every operation are evaluated; none has an effect. Numbers are doubles: `1/0` is infinite, `0/0` and

@@ -46,7 +46,7 @@ impl Interval {
 }
 
 /// See [`Expression::may_hold`].
-pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]]) -> bool {
+pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]], nan: &[bool]) -> bool {
     let mut stack = [ANY; STACK_MAX];
     let mut n = 0;
     for op in ops {
@@ -56,7 +56,7 @@ pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]]) -> b
                 n += 1;
             }
             Op::Variable(v) => {
-                stack[n] = Interval::around(&ranges[v], false);
+                stack[n] = Interval::around(&ranges[v], nan.get(v) == Some(&true));
                 n += 1;
             }
             Op::Unary(f) => stack[n - 1] = unary(f, stack[n - 1]),

@@ -255,7 +255,7 @@ fn faults_have_a_place_and_say_what_to_write() {
     for (text, at, says) in [
         ("", 0, "found the end"),
         ("1 +", 3, "found the end"),
-        ("quality > 6 && x = 1", 12, "`and`"),
+        ("quality > 6 & x = 1", 12, "`and`"),
         ("qality > 6", 0, "quality"),
         ("cosh(x) > 6", 0, "there is no function `cosh`"),
         ("1 < x < 2", 6, "not chained"),

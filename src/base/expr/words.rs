@@ -16,16 +16,12 @@ pub(super) enum Token<'a> {
 const SIGNS: [&str; 17] =
     ["==", "!=", "<=", ">=", "=", "<", ">", "+", "-", "*", "/", "^", "(", ")", "[", "]", ","];
 
+/// Other spellings of words.
+const WORDS: [(&str, &str); 2] = [("&&", "and"), ("||", "or")];
+
 /// Operators of other languages, and their replacement here.
-const FOREIGN: [(&str, &str); 7] = [
-    ("&&", "`and`"),
-    ("||", "`or`"),
-    ("<>", "`!=`"),
-    ("**", "`^`"),
-    ("&", "`and`"),
-    ("|", "`or`"),
-    ("!", "`not`"),
-];
+const FOREIGN: [(&str, &str); 5] =
+    [("<>", "`!=`"), ("**", "`^`"), ("&", "`and`"), ("|", "`or`"), ("!", "`not`")];
 
 /// The word at or after `at`, where it begins and where it ends.
 ///
@@ -48,8 +44,11 @@ pub(super) fn next_word(text: &str, at: usize) -> Result<(Token<'_>, usize, usiz
         };
     }
     if first.is_alphabetic() || first == '_' {
-        let length = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+        let length = name_length(rest);
         return Ok((Token::Name(&rest[..length]), start, start + length));
+    }
+    if let Some((sign, word)) = WORDS.iter().find(|(sign, _)| rest.starts_with(sign)) {
+        return Ok((Token::Name(word), start, start + sign.len()));
     }
     let foreign = FOREIGN.iter().find(|(sign, _)| rest.starts_with(sign));
     if let Some(&(sign, ours)) = foreign.filter(|_| !rest.starts_with("!=")) {
@@ -58,6 +57,20 @@ pub(super) fn next_word(text: &str, at: usize) -> Result<(Token<'_>, usize, usiz
     match SIGNS.iter().find(|sign| rest.starts_with(**sign)) {
         Some(sign) => Ok((Token::Sign(sign), start, start + sign.len())),
         None => Err(fault(start, format!("{first:?} means nothing here"))),
+    }
+}
+
+/// Bytes of the name a text begins with: letters, digits and `_`; a point and more of these, as in `u.x`.
+fn name_length(text: &str) -> usize {
+    let word = |from: usize| {
+        let rest = &text[from..];
+        rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).map_or(text.len(), |n| from + n)
+    };
+    let end = word(0);
+    let is_letter = |c: char| c.is_alphabetic() || c == '_';
+    match text[end..].strip_prefix('.') {
+        Some(rest) if rest.starts_with(is_letter) => word(end + 1),
+        _ => end,
     }
 }
 

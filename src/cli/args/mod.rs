@@ -1,5 +1,6 @@
 //! What can be typed.
 
+mod field;
 mod mesh;
 mod query;
 mod resaturate;
@@ -13,6 +14,7 @@ mod words;
 
 use clap::{Parser, Subcommand};
 
+pub use field::{AddFieldArgs, FieldAction, FieldArgs};
 pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
 pub use query::QueryArgs;
 pub use resaturate::ResaturateArgs;
@@ -86,6 +88,10 @@ pub enum Command {
     ///
     /// All that is given must hold; nothing given means all tetrahedra. Only the parts of the store that matter are read.
     Query(Box<QueryArgs>),
+    /// Keep values with a mesh: temperatures, displacements, marks
+    ///
+    /// Fields have a value at each vertex or tetrahedron. `tetdb query`, exports and pictures take them by name.
+    Field(Box<FieldArgs>),
     /// Prove that a store holds a valid mesh
     ///
     /// All tetrahedra positive by exact signs, each face paired or on the surface, each input triangle there, checksums and digest as they
@@ -148,6 +154,7 @@ impl Command {
             Self::Info(a) => a.of.json,
             Self::Digest(a) => a.json,
             Self::Query(a) => a.json,
+            Self::Field(a) => a.is_json(),
             Self::Verify(a) => a.read.json,
             Self::Compare(a) => a.read.json,
             Self::Export(a) => a.read.json,

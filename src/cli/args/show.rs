@@ -2,10 +2,6 @@
 
 use std::path::PathBuf;
 
-use tetdb_engine::api::ColorBy;
-
-use super::words::word_of;
-
 use super::run::ReadArgs;
 
 /// A cut through the mesh by a plane, seen from the side its direction points to; or surfaces in space. Reads only what is seen.
@@ -44,9 +40,9 @@ pub struct SnapshotArgs {
     /// The direction towards the viewer of what is shown in space
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub from: Option<String>,
-    /// What colors stand for: size is the mean of the longest and the shortest edge, label that of input triangles with --surface or --shell
-    #[arg(long, value_parser = word_of::<ColorBy>(&[]), default_value = "subdomain", value_name = "WHAT")]
-    pub color: ColorBy,
+    /// What colors stand for: subdomain, region, quality, size, label, or a field such as temperature or u.x; size is the mean of the longest and the shortest edge, label that of input triangles with --surface or --shell
+    #[arg(long, default_value = "subdomain", value_name = "WHAT")]
+    pub color: String,
     /// Draw only tetrahedra for which this holds, as in `tetdb query`
     #[arg(long = "where", value_name = "EXPRESSION", allow_hyphen_values = true)]
     pub condition: Option<String>,

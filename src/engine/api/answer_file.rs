@@ -111,7 +111,7 @@ fn field(column: AnswerColumn) -> NpyField {
         AnswerColumn::Vertices => ("<i8", "4"),
         AnswerColumn::Points => ("<f8", "4, 3"),
         _ if column.is_integer() => ("<i8", ""),
-        AnswerColumn::Variable(_) => ("<f8", ""),
+        AnswerColumn::Variable(_) | AnswerColumn::Field { .. } => ("<f8", ""),
     };
     NpyField { name: column.name(), kind, shape }
 }

@@ -1,7 +1,11 @@
 //! Answers as rows with named columns.
 
-use super::VARIABLES;
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
+
+use super::{Error, Scalar, Store, VARIABLES};
 use serde_json::{Map, Value, json};
+use tetdb_schema::field::FieldPlace;
 use tetdb_schema::ids::VertexId;
 use tetdb_store::query::Hit;
 
@@ -20,6 +24,15 @@ pub enum AnswerColumn {
     Points,
     /// A variable of conditions, as a position in [`VARIABLES`].
     Variable(usize),
+    /// A component of a field; see [`Store::answer_columns`].
+    Field {
+        /// Its name in conditions.
+        name: &'static str,
+        /// Place among the columns of fields of a question.
+        place: usize,
+        /// True if the numbers are integers.
+        is_integer: bool,
+    },
 }
 
 const REGION: usize = 1;
@@ -45,12 +58,13 @@ impl AnswerColumn {
             Self::Vertices => "vertices",
             Self::Points => "points",
             Self::Variable(v) => VARIABLES[v],
+            Self::Field { name, .. } => name,
         }
     }
 
     /// Returns whether the column's values are integers.
     pub fn is_integer(self) -> bool {
-        matches!(self, Self::Variable(REGION | SUBDOMAIN))
+        matches!(self, Self::Variable(REGION | SUBDOMAIN) | Self::Field { is_integer: true, .. })
     }
 
     /// Number of values of this column in a row.
@@ -61,6 +75,43 @@ impl AnswerColumn {
             Self::Points => 12,
             _ => 1,
         }
+    }
+}
+
+/// Names of columns of fields. Each is kept for the whole process, once.
+static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+
+fn kept(name: &str) -> &'static str {
+    let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = names.get(name) {
+        return known;
+    }
+    let kept: &'static str = Box::leak(name.to_owned().into_boxed_str());
+    names.insert(kept);
+    kept
+}
+
+impl Store {
+    /// The columns of these names: `id`, `vertices`, `points`, one of [`VARIABLES`], or a component of a field; `None` for another name.
+    /// A question with columns of fields is given all its columns by [`Query::with_columns`](super::Query::with_columns).
+    ///
+    /// Errors: damage.
+    pub fn answer_columns(&self, names: &[&str]) -> Result<Vec<Option<AnswerColumn>>, Error> {
+        let fields = self.fields()?;
+        let mut n = 0;
+        let of_field = |name: &str, place: usize| {
+            let field = fields.iter().find(|field| field.columns.iter().any(|c| c == name))?;
+            let is_integer = field.number.is_integer() && field.at == FieldPlace::Tets;
+            Some(AnswerColumn::Field { name: kept(name), place, is_integer })
+        };
+        let columns = names.iter().map(|name| {
+            AnswerColumn::from_name(name).or_else(|| {
+                let column = of_field(name, n);
+                n += usize::from(column.is_some());
+                column
+            })
+        });
+        Ok(columns.collect())
     }
 }
 
@@ -120,6 +171,10 @@ impl AnswerRow {
                 vec![AnswerValue::Integer(hit.values()[v] as i64)]
             }
             AnswerColumn::Variable(v) => vec![AnswerValue::Number(hit.values()[v])],
+            AnswerColumn::Field { place, .. } => vec![match hit.extra[place] {
+                Scalar::Int(n) => AnswerValue::Integer(n),
+                Scalar::Float(x) => AnswerValue::Number(x),
+            }],
         }
     }
 

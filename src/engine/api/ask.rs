@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use super::guard::guarded_in;
-use super::{Condition, Error, Store, VARIABLES};
+use super::{AnswerColumn, Condition, Error, Store, VARIABLES};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::RunContext;
 use tetdb_schema::code::Code;
 pub use tetdb_schema::ids::{TetId, VertexId};
 pub use tetdb_store::query::Measures as ChunkCounts;
-use tetdb_store::query::{Hit, Ordered, QueryError, QuerySession, Selection, Solid};
+use tetdb_store::query::{EXTRA_MAX, Hit, Ordered, QueryError, QuerySession, Selection, Solid};
 
 /// Share of the memory cap for sorting answers. The session holds three quarters of the cap.
 const SORTED_SHARE: u64 = 8;
@@ -148,16 +148,19 @@ impl<'s> Query<'s> {
     /// Selects tetrahedra that fulfill a condition such as `quality > 6 and region in [1, 2]`.
     ///
     /// Variables: quality, region, subdomain, volume, x, y, z (of the centroid), edge_min, edge_max, angle_min, angle_max (in degrees)
-    /// and excess (quality over the least that the faces on the surface allow).
+    /// and excess (quality over the least that the faces on the surface allow); fields of the store by name, where those at vertices
+    /// stand for their mean; names of regions stand for their numbers.
     ///
     /// Errors: `bad-expression`, with the place.
     pub fn where_(self, condition: &str) -> Result<Self, Error> {
-        Ok(self.condition(Condition::parse_located(condition)?))
+        let condition = self.store.condition_located(condition)?;
+        Ok(self.condition(condition))
     }
 
     /// Selects tetrahedra that fulfill the condition; see [`Query::where_`].
     pub fn condition(mut self, condition: Condition) -> Self {
-        self.selection.condition = Some(condition.0);
+        self.selection.condition = Some(condition.expression);
+        self.selection.condition_extra = condition.extra;
         self
     }
 
@@ -189,11 +192,34 @@ impl<'s> Query<'s> {
         self
     }
 
-    /// Sorts the answers by one of the [`VARIABLES`] of conditions. Errors: `bad-query`.
+    /// Also reads these columns of fields, which [`Store::answer_columns`] gave.
+    pub fn with_columns(mut self, columns: &[AnswerColumn]) -> Result<Self, Error> {
+        let known = self.store.field_variables()?;
+        for column in columns {
+            if let AnswerColumn::Field { name, .. } = column
+                && let Some((_, variable)) = known.iter().find(|(other, _)| other == name)
+            {
+                self.selection.extra.push(variable.clone());
+            }
+        }
+        Ok(self)
+    }
+
+    /// Sorts the answers by one of the [`VARIABLES`] of conditions, or by a field. Errors: `bad-query`.
     pub fn order_by(mut self, variable: &str, order: Order) -> Result<Self, Error> {
-        let Some(place) = VARIABLES.iter().position(|v| *v == variable) else {
-            let message = format!("{variable}: expected one of {}", VARIABLES.join(", "));
-            return Err(Error::new(Code::BadQuery, message));
+        let place = match VARIABLES.iter().position(|v| *v == variable) {
+            Some(place) => place,
+            None => {
+                let known = self.store.field_variables()?;
+                let Some((_, field)) = known.iter().find(|(name, _)| name == variable) else {
+                    let fields = known.iter().map(|(name, _)| &**name);
+                    let names: Vec<&str> = VARIABLES.into_iter().chain(fields).collect();
+                    let message = format!("{variable}: expected one of {}", names.join(", "));
+                    return Err(Error::new(Code::BadQuery, message));
+                };
+                self.selection.extra.push(field.clone());
+                VARIABLES.len() + self.selection.extra.len() - 1
+            }
         };
         self.selection.excess |= variable == "excess";
         self.order = Some((place, order));
@@ -211,6 +237,10 @@ impl<'s> Query<'s> {
         let settings = self.store.settings();
         let (memory, dir) = (settings.cap()? / SORTED_SHARE, settings.scratch_dir());
         let Self { store, selection, order, limit } = self;
+        if selection.extra.len() > EXTRA_MAX {
+            let message = format!("a question answers with at most {EXTRA_MAX} numbers of fields");
+            return Err(Error::new(Code::BadQuery, message).with_help("ask for fewer columns"));
+        }
         let (context, session) = store.context_and_session()?;
         let context = context.clone();
         let found = guarded_in(&context, || match order {

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::fields::{Field, fields_of};
 use super::{Error, Settings, guarded};
 use crate::pipeline;
 use tetdb_base::geom::{Aabb, Point};
@@ -57,6 +58,10 @@ pub struct StoreInfo {
     pub coarse_bytes: u64,
     /// Bytes of the previous versions that an undo restores.
     pub previous_bytes: u64,
+    /// Fields, in the order in which they were added.
+    pub fields: Vec<Field>,
+    /// Bytes of the fields' files.
+    pub field_bytes: u64,
     /// Bytes of the catalog.
     pub catalog_bytes: u64,
     /// Digest of all tetrahedra. Equal meshes have equal digests.
@@ -162,7 +167,7 @@ impl StoreInfo {
         let catalog = &mut Catalog::open(path)?;
         let (state, job) = (catalog.state()?, catalog.job()?);
         let rows = catalog.subdomains()?;
-        let previous = catalog.previous()?;
+        let (previous, fields) = (catalog.previous()?, fields_of(catalog)?);
         let (coarse, subdomains) = (catalog.coarse_snapshots()?, subdomains(catalog, &rows)?);
         let stages = catalog.stages()?.into_iter();
         let all = (rows.iter()).map(|r| Aabb::around(r.bounds.map(Point::from_array)));
@@ -187,6 +192,8 @@ impl StoreInfo {
             bytes: rows.iter().map(|r| r.bytes).sum(),
             coarse_bytes: coarse.iter().map(|c| c.bytes).sum(),
             previous_bytes: previous.iter().map(|r| r.bytes).sum(),
+            field_bytes: fields.iter().map(|field| field.bytes).sum(),
+            fields,
             catalog_bytes: catalog.file_bytes()?,
             digest: text_of(digest),
             stages: stages
@@ -206,7 +213,8 @@ impl StoreInfo {
 
     /// Total bytes of the store on disk.
     pub fn bytes_on_disk(&self) -> u64 {
-        self.bytes + self.coarse_bytes + self.previous_bytes + self.catalog_bytes
+        let kept = self.previous_bytes + self.field_bytes;
+        self.bytes + self.coarse_bytes + kept + self.catalog_bytes
     }
 
     /// Qualities of all tetrahedra.

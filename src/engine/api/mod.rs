@@ -16,6 +16,7 @@
 //! | `store`, `info`, `names`, `located`, `compare` | a finished store; records; names; points in tetrahedra; two meshes compared |
 //! | `verify`, `verify_shared`, `verify_server` | verification, by one or several processes |
 //! | `ask`, `condition`, `answer_rows`, `answer_file` | questions and their answers |
+//! | `fields`, `field_spec`, `field_sources` | values kept with a finished mesh |
 //! | `remesh`, `remesh_sizes` | meshing sub-domains again |
 //! | `tasks`, `tasks_status` | one mesh by the tasks of a batch scheduler |
 //! | `mpi` | one mesh by the ranks of an MPI program |
@@ -32,6 +33,9 @@ mod defects;
 #[doc(hidden)]
 pub mod error;
 mod field_arrays;
+mod field_sources;
+mod field_spec;
+mod fields;
 mod from_errors;
 mod guard;
 mod info;
@@ -85,6 +89,9 @@ pub use compare::Comparison;
 pub use condition::{Condition, ExprError, VARIABLES};
 pub use defects::DefectPlace;
 pub use error::Error;
+pub use field_sources::{FieldIds, FieldSource};
+pub use field_spec::NewField;
+pub use fields::{Field, FieldNumber, FieldPlace, FieldReader, FieldValues, Scalar};
 #[doc(hidden)]
 pub use guard::guarded;
 pub use info::{EmbeddedInfo, RegionInfo, StageInfo, StoreInfo, SubdomainInfo};
@@ -136,6 +143,7 @@ pub use tetdb_repair::remesh::RemeshReport as SurfaceRemeshReport;
 pub use tetdb_repair::wrap::WrapReport;
 pub use tetdb_schema::catalog::{QualityRow, StoreState};
 pub use tetdb_schema::code::Code;
+pub use tetdb_schema::field::FieldRange;
 pub use tetdb_schema::labels::LabelSet;
 pub use tetdb_schema::source::BOUNDARY_OF as BOUNDARY_PREFIX;
 pub use tetdb_schema::word::Word;

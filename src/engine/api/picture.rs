@@ -13,7 +13,7 @@ use crate::view::{Clip, Extent, Piece, Section, ShellView, View};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Budget, attempt};
 use tetdb_schema::catalog::Stage;
-use tetdb_store::query::{QuerySession, Selection};
+use tetdb_store::query::{ExtraVariable, QuerySession, Selection};
 
 /// Qualities from this value on have the last color. Few are worse, and the others should remain distinguishable.
 const QUALITY_MOST: f32 = 3.0;
@@ -67,6 +67,8 @@ pub struct Snapshot {
     plane: Option<Clip>,
     from: Option<Point>,
     color: ColorBy,
+    /// A field instead.
+    field: Option<String>,
     pixels: [u32; 2],
     condition: Option<Condition>,
     crinkle: bool,
@@ -80,7 +82,7 @@ pub struct Snapped {
     pub bytes: u64,
     /// Polygons drawn.
     pub pieces: u64,
-    /// Least and greatest quality of the drawn polygons' tetrahedra.
+    /// Least and greatest quality of the drawn polygons' tetrahedra; of the field instead, where one gives the colors.
     pub quality: [f32; 2],
     /// Least and greatest mean edge length.
     pub size: [f32; 2],
@@ -95,6 +97,7 @@ impl Snapshot {
             plane: None,
             from: None,
             color: ColorBy::default(),
+            field: None,
             pixels: [1600, 1200],
             condition: None,
             crinkle: false,
@@ -151,6 +154,13 @@ impl Snapshot {
         self
     }
 
+    /// Colors a cut by a field of the store, or by a component such as `u.x`; see [`Store::condition`].
+    pub fn color_field(mut self, name: impl Into<String>) -> Self {
+        self.field = Some(name.into());
+        self.color = ColorBy::Quality;
+        self
+    }
+
     /// Sets width and height in pixels. Default: 1600 by 1200.
     pub fn pixels(mut self, width: u32, height: u32) -> Self {
         self.pixels = [width, height];
@@ -181,6 +191,9 @@ impl Snapshot {
         if self.from.is_some() && !in_space {
             return bad("a direction to look from: expected a picture in space");
         }
+        if in_space && self.field.is_some() {
+            return bad("a color by a field: expected a cut, for faces have no value");
+        }
         if in_space && self.color == ColorBy::Quality {
             return bad(
                 "a color by quality: expected sub-domain, region or size, for faces have no quality",
@@ -206,7 +219,9 @@ impl Store {
     pub fn snapshot(&self, out: impl AsRef<Path>, snapshot: &Snapshot) -> Result<Snapped, Error> {
         guarded(self.settings(), || {
             check_target(out.as_ref(), &inputs_of(self.path()))?;
-            take(self.path(), out.as_ref(), snapshot, self.settings())
+            let field =
+                snapshot.field.as_ref().map(|name| self.field_variable(name)).transpose()?;
+            take(self.path(), out.as_ref(), (snapshot, field), self.settings())
         })
     }
 }
@@ -215,7 +230,7 @@ impl Store {
 fn take(
     path: &Path,
     out: &Path,
-    snapshot: &Snapshot,
+    (snapshot, field): (&Snapshot, Option<ExtraVariable>),
     settings: &Settings,
 ) -> Result<Snapped, Error> {
     snapshot.check()?;
@@ -232,7 +247,7 @@ fn take(
         _ => QuerySession::open(store, &share)?,
     };
     let scratch = (&*settings.scratch_dir(), budget.available() / 8);
-    attempt(|| snapshot.draw(out, &mut session, scratch))?
+    attempt(|| snapshot.draw(out, &mut session, scratch, field))?
 }
 
 impl Snapshot {
@@ -241,8 +256,9 @@ impl Snapshot {
         out: &Path,
         session: &mut QuerySession,
         scratch: (&Path, u64),
+        field: Option<ExtraVariable>,
     ) -> Result<Snapped, Error> {
-        let (section, view) = pieces(self, session, scratch)?;
+        let (section, view) = pieces(self, session, scratch, field)?;
         let extent = section.extent;
         if extent.n == 0 {
             let message = "the plane cuts no tetrahedron of the mesh";
@@ -253,7 +269,7 @@ impl Snapshot {
             pixels: self.pixels,
             bounds: extent.bounds,
             edge: f64::from(extent.size[0].midpoint(extent.size[1])) * 0.5,
-            bar: bar(self.color, &extent),
+            bar: bar(self, &extent),
             kinds: are_many(self.color, self.subject, session),
         };
         let mut picture = Picture::new(out, frame)?;
@@ -281,6 +297,7 @@ fn pieces(
     snapshot: &Snapshot,
     session: &mut QuerySession,
     (dir, memory): (&Path, u64),
+    field: Option<ExtraVariable>,
 ) -> Result<(Section, View), Error> {
     let bounds = session.bounds();
     let plane = snapshot.plane;
@@ -310,8 +327,12 @@ fn pieces(
         None => [middle, thinnest(&bounds)],
     });
     let view = View::new(point, normal);
-    let condition = snapshot.condition.clone().map(|condition| condition.0);
-    let selection = Selection { condition, ..Selection::default() };
+    let (condition, condition_extra) = match snapshot.condition.clone() {
+        Some(Condition { expression, extra }) => (Some(expression), extra),
+        None => (None, Vec::new()),
+    };
+    let extra = field.into_iter().collect();
+    let selection = Selection { condition, condition_extra, extra, ..Selection::default() };
     let section = view::section(session, &view, snapshot.crinkle, selection, dir, memory)?;
     Ok((section, view))
 }
@@ -329,7 +350,7 @@ fn draw(
         ColorBy::Label => piece.label.into_iter().for_each(|label| picture.kind(label)),
         ColorBy::Quality | ColorBy::Size => {}
     }
-    let color = color(snapshot.color, extent, piece);
+    let color = color(snapshot, extent, piece);
     // Faces seen at an angle get less light. Faces seen from behind are inside faces and have another color.
     let flat =
         matches!(snapshot.subject, Subject::Surface(ShellView::Natural(_) | ShellView::Chosen(_)));
@@ -383,8 +404,9 @@ fn thinnest(bounds: &Aabb) -> Point {
     }
 }
 
-fn bar(by: ColorBy, extent: &Extent) -> Option<ColorBar> {
-    let [least, most] = match by {
+fn bar(of: &Snapshot, extent: &Extent) -> Option<ColorBar> {
+    let [least, most] = match of.color {
+        ColorBy::Quality if of.field.is_some() => extent.quality,
         ColorBy::Quality => [1.0, QUALITY_MOST],
         ColorBy::Size => extent.size,
         ColorBy::Subdomain | ColorBy::Region | ColorBy::Label => return None,
@@ -392,13 +414,13 @@ fn bar(by: ColorBy, extent: &Extent) -> Option<ColorBar> {
     Some(ColorBar { least: f64::from(least), most: f64::from(most) })
 }
 
-fn color(by: ColorBy, extent: &Extent, piece: &Piece) -> Rgb {
+fn color(of: &Snapshot, extent: &Extent, piece: &Piece) -> Rgb {
     let share = |x: f32| {
-        bar(by, extent).map_or(0.0, |bar| {
+        bar(of, extent).map_or(0.0, |bar| {
             (f64::from(x) - bar.least) / (bar.most - bar.least).max(f64::MIN_POSITIVE)
         })
     };
-    match by {
+    match of.color {
         ColorBy::Subdomain => category(piece.subdomain),
         ColorBy::Region => category(piece.region),
         ColorBy::Label => piece.label.map_or(INSIDE, category),

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::preflight::scratch_beside;
 use super::remesh_sizes::{Lengths, RemeshSizes};
 use super::store::{open_finished, open_to_change};
-use super::{Error, Settings, Sizes, Store, Surface, guarded, job, verify};
+use super::{Error, Settings, Sizes, Store, Surface, field_spec, fields, guarded, job, verify};
 use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Values};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_store::audit::Level;
@@ -37,6 +37,7 @@ pub struct Remesh {
     sizes: RemeshSizes,
     repair: bool,
     verify: bool,
+    drop_fields: bool,
 }
 
 /// The sub-domains to mesh again.
@@ -93,6 +94,7 @@ impl Store {
         let summary = guarded(&settings, || {
             let mut catalog = open_to_change(&path, &settings)?;
             let lock = catalog.lock();
+            settle_fields(&mut catalog, false)?;
             let summary = pipeline::undo(&mut catalog)?;
             catalog.close()?;
             if let (true, Some(lock)) = (verify, lock) {
@@ -126,6 +128,7 @@ impl Remesh {
             sizes: RemeshSizes::default(),
             repair: false,
             verify: true,
+            drop_fields: false,
         }
     }
 
@@ -176,6 +179,12 @@ impl Remesh {
     /// Repairs damaged files: the result must match the digests in the catalog. Without a list, all damaged sub-domains are repaired.
     pub fn repair(mut self) -> Self {
         self.repair = true;
+        self
+    }
+
+    /// Drops all fields of the store first. Otherwise a store with fields is refused: their values belong to the mesh as it is.
+    pub fn drop_fields(mut self) -> Self {
+        self.drop_fields = true;
         self
     }
 
@@ -233,6 +242,7 @@ impl Remesh {
             return Ok(None);
         }
         check_recipe(&mut open, self.repair, &self.settings)?;
+        settle_fields(&mut open, self.drop_fields)?;
         let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
         let summary = pipeline::resaturate(&mut open, &options, &request, &budget, &watch)?;
         open.close()?;
@@ -270,6 +280,23 @@ impl Remeshed {
             subdomains: summary.parts.into_iter().map(|part| [part.before, part.after]).collect(),
         })
     }
+}
+
+/// Drops the fields of a store whose mesh is about to change, or refuses it.
+fn settle_fields(open: &mut Catalog, drop: bool) -> Result<(), Error> {
+    let fields = open.fields()?;
+    if fields.is_empty() {
+        return Ok(());
+    }
+    if drop {
+        return fields::drop_all(open, &fields, "drop fields");
+    }
+    let names: Vec<&str> = fields.iter().map(|field| &*field.name).collect();
+    let message = format!(
+        "the store has fields ({}), whose values belong to the mesh as it is",
+        names.join(", ")
+    );
+    Err(field_spec::bad(message).with_help("drop the fields first, and add them again afterwards"))
 }
 
 /// A repair must follow the recipe that began the store. Any other change only reports that the recipe differs.

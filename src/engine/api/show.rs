@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
-use super::{Error, Store, guarded};
+use super::{Error, FieldPlace, Store, guarded};
 use tetdb_io::write::{self, Content, ElementOrder, ExportSelection};
 pub use tetdb_io::write::{ENDINGS as MESH_ENDINGS, MeshFormat, Share, Writers};
+use tetdb_store::store::Catalog;
 
 /// Largest memory of a writer, whatever the cap.
 const MEMORY_MAX: u64 = 512 << 20;
@@ -165,6 +166,29 @@ impl Store {
         self.write_export(out.as_ref(), options, Some(writers))
     }
 
+    /// Says which fields a file will not have.
+    fn note_fields(
+        &self,
+        catalog: &mut Catalog,
+        out: &Path,
+        selection: &ExportSelection,
+    ) -> Result<(), Error> {
+        let has_fields = write::check(out, selection)?.has_fields();
+        let has_vertices = selection.order == ElementOrder::First && !selection.split_sheets;
+        let mut fields = catalog.fields()?;
+        fields.retain(|field| !has_fields || field.place == FieldPlace::Vertices && !has_vertices);
+        if !fields.is_empty() && selection.content == Content::Mesh {
+            let names: Vec<&str> = fields.iter().map(|field| &*field.name).collect();
+            let why = match has_fields {
+                true => "it has vertices that the store does not have",
+                false => "fields are written to .vtu, .pvtu, .vtkhdf and .npy",
+            };
+            let (out, names) = (out.display(), names.join(", "));
+            self.settings().note(format!("note: {out} is written without {names}: {why}"));
+        }
+        Ok(())
+    }
+
     fn write_export(
         &self,
         out: &Path,
@@ -177,8 +201,10 @@ impl Store {
                 check_target(out, &inputs_of(self.path()))?;
             }
             let memory = (settings.cap()? / 2).min(MEMORY_MAX) as usize;
+            let mut catalog = open_finished(self.path())?;
+            self.note_fields(&mut catalog, out, &options.selection)?;
             let report = write::export_with(
-                &mut open_finished(self.path())?,
+                &mut catalog,
                 (out, &options.selection),
                 memory,
                 &|done, total| settings.count("export", done, total, "records"),

@@ -213,6 +213,17 @@ impl Store {
         self.summary.digest == other.summary.digest
     }
 
+    /// Another reader of the same state of the store.
+    pub(super) fn catalog_shared(&self) -> Catalog {
+        self.catalog.share()
+    }
+
+    /// Goes on with the store as it is now, after a change.
+    pub(super) fn reopen(&mut self) -> Result<(), Error> {
+        *self = Self::open_with(&self.path, self.settings.clone())?;
+        Ok(())
+    }
+
     /// Closes the query session. The next question opens it again.
     pub(super) fn close_session(&mut self) {
         self.session = None;

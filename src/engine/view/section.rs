@@ -89,7 +89,7 @@ pub struct Piece {
     pub region: u32,
     /// Number of the label, for an input triangle.
     pub label: Option<u32>,
-    /// Quality q of the tetrahedron.
+    /// Quality q of the tetrahedron; its value where a field is selected.
     pub quality: f32,
     /// Mean length of the tetrahedron's longest and shortest edge.
     pub size: f32,
@@ -148,9 +148,13 @@ pub fn section(
 ) -> Result<Section, QueryError> {
     selection.solids.push(Solid::Plane { point: view.origin, normal: view.normal });
     let mut all = Pieces::new(dir, memory_bytes);
+    let has_field = !selection.extra.is_empty();
     for tet in session.select(selection)? {
         let tet = tet?;
-        for (depth, piece) in pieces(view, crinkle, &tet) {
+        for (depth, mut piece) in pieces(view, crinkle, &tet) {
+            if has_field {
+                piece.quality = tet.extra[0].to_f64() as f32;
+            }
             all.push(depth, &piece)?;
         }
     }
@@ -170,7 +174,7 @@ impl Pieces {
             extent: Extent {
                 n: 0,
                 bounds: [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
-                quality: [f32::INFINITY, 0.0],
+                quality: [f32::INFINITY, f32::NEG_INFINITY],
                 size: [f32::INFINITY, 0.0],
             },
         }

@@ -64,23 +64,29 @@ fn read_array(path: &Path, columns: Option<u64>, limit: u64) -> Result<Vec<f64>>
 type NumberFormat = (usize, bool);
 
 /// An array file, read from its beginning on.
-struct ArrayFile {
-    from: BufReader<File>,
-    name: String,
+pub(super) struct ArrayFile {
+    pub from: BufReader<File>,
+    pub name: String,
     at: u64,
 }
 
 impl ArrayFile {
+    /// Errors: the file cannot be opened.
+    pub fn open(path: &Path) -> Result<Self> {
+        let (from, _) = open_plain(path)?;
+        Ok(Self { from, name: path.display().to_string(), at: 0 })
+    }
+
     fn place(&self, spot: Spot) -> FilePlace {
         FilePlace { file: self.name.clone(), spot }
     }
 
-    fn unexpected(&self, spot: Spot, expected: &str, found: String) -> ReadError {
+    pub fn unexpected(&self, spot: Spot, expected: &str, found: String) -> ReadError {
         let expected = expected.to_owned();
         self.place(spot).refuse(ReadFault::Unexpected { expected, found })
     }
 
-    fn take(&mut self, n: usize) -> Result<Vec<u8>> {
+    pub fn take(&mut self, n: usize) -> Result<Vec<u8>> {
         let mut bytes = vec![0; n];
         let read = self.from.read_exact(&mut bytes);
         read.map_err(|e| {
@@ -102,8 +108,8 @@ impl ArrayFile {
         })
     }
 
-    /// Reads the head: how many numbers follow, and their kind. With `columns`, they are rows of so many.
-    fn head(&mut self, columns: Option<u64>) -> Result<(u64, NumberFormat)> {
+    /// Reads the head: type of the numbers, whether they lie in C order, and the shape as text.
+    pub fn head_words(&mut self) -> Result<(String, bool, String)> {
         let start = self.take(8)?;
         if !start.starts_with(MAGIC) {
             let found = format!("{:x?}", &start[..6]);
@@ -117,7 +123,15 @@ impl ArrayFile {
         }
         let head = String::from_utf8_lossy(&self.take(length)?).into_owned();
         let kind = value_of(&head, "descr").unwrap_or_default();
-        let kind = match kind.trim_matches(['\'', '"']) {
+        let is_by_rows = value_of(&head, "fortran_order").as_deref() == Some("False");
+        let shape = value_of(&head, "shape").unwrap_or_default();
+        Ok((kind.trim_matches(['\'', '"']).to_owned(), is_by_rows, shape))
+    }
+
+    /// Reads the head: how many numbers follow, and their kind. With `columns`, they are rows of so many.
+    fn head(&mut self, columns: Option<u64>) -> Result<(u64, NumberFormat)> {
+        let (kind, is_by_rows, shape) = self.head_words()?;
+        let kind = match &*kind {
             "<f8" | "=f8" => (8, false),
             "<f4" | "=f4" => (4, false),
             ">f8" => (8, true),
@@ -127,12 +141,7 @@ impl ArrayFile {
                 return Err(self.unexpected(Spot::Byte(8), expected, format!("type {kind}")));
             }
         };
-        let shape = value_of(&head, "shape").unwrap_or_default();
-        let sides: Vec<&str> = (shape.trim_matches(['(', ')']).split(','))
-            .map(str::trim)
-            .filter(|side| !side.is_empty())
-            .collect();
-        let is_by_rows = value_of(&head, "fortran_order").as_deref() == Some("False");
+        let sides = sides_of(&shape);
         let n = match (&sides[..], columns) {
             ([n], None) => n.parse().ok(),
             ([n, row], Some(columns)) if is_by_rows && row.parse() == Ok(columns) => {
@@ -150,6 +159,12 @@ impl ArrayFile {
         })?;
         Ok((n, kind))
     }
+}
+
+/// The sides of an array, from the text of its shape.
+pub(super) fn sides_of(shape: &str) -> Vec<&str> {
+    let sides = shape.trim_matches(['(', ')']).split(',').map(str::trim);
+    sides.filter(|side| !side.is_empty()).collect()
 }
 
 /// The text of a key's value in a head, up to the comma that ends it.

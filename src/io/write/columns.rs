@@ -6,6 +6,7 @@ use std::borrow::Cow;
 
 use super::error::Result;
 use super::stream::Strip;
+use tetdb_schema::field::{FieldNumber, FieldRow};
 
 /// Type of a column's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +15,7 @@ pub(super) enum Number {
     I32,
     U32,
     I64,
+    F32,
     F64,
 }
 
@@ -25,6 +27,7 @@ impl Number {
             Self::I32 => (4, "Int32", "<i4"),
             Self::U32 => (4, "UInt32", "<u4"),
             Self::I64 => (8, "Int64", "<i8"),
+            Self::F32 => (4, "Float32", "<f4"),
             Self::F64 => (8, "Float64", "<f8"),
         }
     }
@@ -86,6 +89,34 @@ pub(super) struct TableColumn<T> {
     /// Numbers in a row.
     pub components: u64,
     put: Box<Put<T>>,
+}
+
+/// A column for each of the fields, from the words of their values one after the other.
+pub(super) fn field_columns<T: 'static>(
+    fields: &[FieldRow],
+    words: fn(&T) -> &[u64],
+) -> Vec<TableColumn<T>> {
+    let mut start = 0;
+    let columns = fields.iter().map(|field| {
+        let own = start..start + field.components as usize;
+        start = own.end;
+        let (number, bytes) = match field.number {
+            FieldNumber::F32 => (Number::F32, 4),
+            FieldNumber::F64 => (Number::F64, 8),
+            FieldNumber::I32 => (Number::I32, 4),
+            FieldNumber::I64 => (Number::I64, 8),
+        };
+        TableColumn {
+            name: field.name.clone().into(),
+            number,
+            components: field.components.into(),
+            put: Box::new(move |row, strip| {
+                let words = &words(row)[own.clone()];
+                words.iter().try_for_each(|word| strip.put(&word.to_le_bytes()[..bytes]))
+            }),
+        }
+    });
+    columns.collect()
 }
 
 type Put<T> = dyn Fn(&T, &mut Strip) -> Result<()>;

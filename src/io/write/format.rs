@@ -114,6 +114,11 @@ impl MeshFormat {
         Some(format!("{noun}; these do: {}", words.join(", ")))
     }
 
+    /// Returns whether the format has the values of fields.
+    pub fn has_fields(self) -> bool {
+        matches!(self, Self::Vtu | Self::Pvtu | Self::VtkHdf | Self::Numpy)
+    }
+
     /// Returns whether pieces of the format have numbers of the whole, so that the whole is open while they are written.
     pub fn numbers_globally(self) -> bool {
         matches!(self, Self::OpenFoam | Self::Gmsh | Self::Mfem)

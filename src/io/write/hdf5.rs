@@ -16,6 +16,7 @@ impl Number {
         let mut message = match self {
             // Class 1, implied leading bit, sign in bit 63.
             Self::F64 => vec![0x11, 0x20, 63, 0, size, 0, 0, 0],
+            Self::F32 => vec![0x11, 0x20, 31, 0, size, 0, 0, 0],
             // Class 0; bit 3 of the second byte is the sign.
             _ => {
                 let sign = 8 * u8::from(matches!(self, Self::I32 | Self::I64));
@@ -23,6 +24,10 @@ impl Number {
             }
         };
         message.extend(precision);
+        if self == Self::F32 {
+            message.extend([23, 8, 0, 23]);
+            message.extend(127u32.to_le_bytes());
+        }
         if self == Self::F64 {
             // Exponent: place and bits; mantissa: place and bits; bias.
             message.extend([52, 11, 0, 52]);

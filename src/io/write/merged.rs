@@ -1,10 +1,10 @@
 //! Sub-domains of a store as one mesh, streamed.
 
-use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use tetdb_schema::field::{FieldPlace, FieldRow};
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
@@ -12,37 +12,17 @@ use super::doubles::Doubles;
 use super::embedded::{WrittenEmbedded, memory_left};
 use super::error::{Result, WriteError};
 use super::faces::{FaceSorter, FaceSource, MergedFace, MergedFaces};
+use super::merged_fields::{FieldChunk, open_fields};
 use super::merged_parts::{collect_faces, misplaced, required_faces, sources};
 use super::numbering::{Numbering, PartNumbers, Sharer, Source, shareable_vertices, sharers};
+use super::read_progress::ReadProgress;
 use super::scope::{FaceSet, Scope};
 use tetdb_base::shape::excess_near;
-use tetdb_base::storage::{Sorted, check_cancelled};
+use tetdb_base::storage::Sorted;
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::labels::LabelSet;
 use tetdb_store::sealed::{SealedError, Shape, Subdomain};
 use tetdb_store::store::Catalog;
-
-/// Counts records and reports progress.
-pub(super) struct ReadProgress<'a> {
-    report: &'a dyn Fn(u64, u64),
-    done: Cell<u64>,
-    total: Cell<u64>,
-}
-
-impl<'a> ReadProgress<'a> {
-    pub fn new(report: &'a dyn Fn(u64, u64)) -> Self {
-        let (done, total) = (Cell::new(0), Cell::new(0));
-        Self { report, done, total }
-    }
-
-    /// Counts `n` more records; unwinds when the run is cancelled.
-    fn advance(&self, n: usize) {
-        check_cancelled();
-        let done = self.done.get() + n as u64;
-        self.done.set(done);
-        (self.report)(done, self.total.get().max(done));
-    }
-}
 
 /// A tetrahedron of the merged mesh.
 pub(super) struct MergedTet {
@@ -56,6 +36,8 @@ pub(super) struct MergedTet {
     pub quality: f64,
     /// Quality over the least quality that the tetrahedron's faces on the surface allow; NaN in a pass that does not measure it.
     pub excess: f64,
+    /// Words of the values of fields, where these are read.
+    pub fields: Vec<u64>,
 }
 
 /// Measures of tetrahedra in a pass.
@@ -102,6 +84,8 @@ pub(super) struct Merged<'a> {
     label_names: Vec<String>,
     pub(super) label_sets: Vec<LabelSet>,
     region_names: Vec<String>,
+    /// Fields at vertices and at tetrahedra that are read with them.
+    fields: [Vec<FieldRow>; 2],
     dir: PathBuf,
     memory: usize,
     progress: ReadProgress<'a>,
@@ -152,6 +136,7 @@ impl<'a> Merged<'a> {
             label_names,
             label_sets,
             region_names,
+            fields: Default::default(),
             dir: dir.to_owned(),
             memory,
             progress,
@@ -166,6 +151,18 @@ impl<'a> Merged<'a> {
         }
         mesh.embedded = embedded;
         Ok(mesh)
+    }
+
+    /// Reads the fields with all later passes, and returns those at vertices and at tetrahedra. Vertices that are not in the store
+    /// have no values, so with them fields at vertices are left out. Errors: damage.
+    pub fn read_fields(&mut self, has_more_vertices: bool) -> Result<[Vec<FieldRow>; 2]> {
+        let (vertices, tets) =
+            self.store.fields()?.into_iter().partition(|field| field.place == FieldPlace::Vertices);
+        self.fields = match has_more_vertices || self.doubles.is_some() {
+            true => [Vec::new(), tets],
+            false => [vertices, tets],
+        };
+        Ok(self.fields.clone())
     }
 
     /// The written embedded edges and points.
@@ -362,11 +359,22 @@ impl<'a> Merged<'a> {
         &mut self,
         mut each: impl FnMut(u64, &SealedVertex) -> Result<()>,
     ) -> Result<()> {
+        self.vertices_with(&[], |number, vertex, _| each(number, vertex))
+    }
+
+    /// As [`Merged::vertices`], with the words of the values of fields, one after the other.
+    pub fn vertices_with(
+        &mut self,
+        fields: &[FieldRow],
+        mut each: impl FnMut(u64, &SealedVertex, &[u64]) -> Result<()>,
+    ) -> Result<()> {
         for p in self.window.clone() {
             let Source { row, .. } = &self.parts[p];
             let numbers = self.numbers_of(p)?;
+            let row = row.clone();
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
-            for chunk in part.vertex_chunks() {
+            let mut files = open_fields(self.store, fields, &part)?;
+            for (c, chunk) in (0..).zip(part.vertex_chunks()) {
                 let chunk = chunk?;
                 let end = u64::from(chunk.first) + chunk.records.len() as u64;
                 if end > row.vertices {
@@ -376,9 +384,10 @@ impl<'a> Merged<'a> {
                     );
                     return Err(part.damaged(what).into());
                 }
-                for (local, vertex) in (chunk.first..).zip(&chunk.records) {
-                    if let Some(number) = numbers.own(local) {
-                        each(number, vertex)?;
+                let values = FieldChunk::read(&mut files, c)?;
+                for (i, vertex) in chunk.records.iter().enumerate() {
+                    if let Some(number) = numbers.own(chunk.first + i as u32) {
+                        each(number, vertex, &values.row(i))?;
                     }
                 }
                 self.progress.advance(chunk.records.len());
@@ -386,7 +395,9 @@ impl<'a> Merged<'a> {
         }
         let first = self.numbering.n_vertices();
         match &self.doubles {
-            Some(doubles) => doubles.each(|place, double| each(first + place, &double.sealed())),
+            Some(doubles) => {
+                doubles.each(|place, double| each(first + place, &double.sealed(), &[]))
+            }
             None => Ok(()),
         }
     }
@@ -404,9 +415,11 @@ impl<'a> Merged<'a> {
     ) -> Result<()> {
         let mut changes = self.doubles.as_ref().map(Doubles::changes).transpose()?;
         for p in self.window.clone() {
-            let Source { row, .. } = &self.parts[p];
+            let row = self.parts[p].row.clone();
             let numbers = self.numbers_of(p)?;
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
+            let fields = self.fields[1].clone();
+            let mut files = open_fields(self.store, &fields, &part)?;
             let mut on_surface = match measured {
                 Measured::Nothing | Measured::Quality => None,
                 Measured::Excess => {
@@ -415,8 +428,9 @@ impl<'a> Merged<'a> {
                 }
             };
             let mut expected = 0;
-            for chunk in 0..part.tet_summaries().len() {
-                let chunk = part.tet_chunk(chunk as u32)?;
+            for c in 0..part.tet_summaries().len() {
+                let chunk = part.tet_chunk(c as u32)?;
+                let values = FieldChunk::read(&mut files, c as u32)?;
                 for (local, tet) in (chunk.first..).zip(&chunk.records) {
                     let id = TetId::new(part.id(), local)
                         .filter(|_| local == expected && u64::from(local) < row.tets);
@@ -448,6 +462,7 @@ impl<'a> Merged<'a> {
                         id,
                         quality,
                         excess,
+                        fields: values.row((local - chunk.first) as usize),
                     })?;
                 }
                 self.progress.advance(chunk.records.len());

@@ -25,6 +25,7 @@ mod hdf5;
 mod label_groups;
 mod medit;
 mod merged;
+mod merged_fields;
 mod merged_parts;
 mod mfem;
 mod midpoints;
@@ -36,6 +37,7 @@ mod output_files;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod pieces;
+mod read_progress;
 mod report;
 mod scope;
 mod selection;
@@ -63,13 +65,15 @@ use format::{
 pub use npy::TextFile;
 pub use npy::bytes;
 pub use npy::{NpyField, NpyTable};
+use read_progress::ReadProgress;
 pub use report::ExportReport;
 use report::FileCounts;
 pub use selection::{Content, ElementOrder, ExportSelection, Share};
 pub use surface::{SurfaceWritten, check_surface_format, surface, wires};
 pub use vtk::{SelectedTet, SelectedVtu, defects};
 
-use merged::{Merged, ReadProgress};
+use merged::Merged;
+pub use numbering::each_vertex_number;
 use output_files::{OutputFiles, STDOUT};
 use scope::{FaceSet, Scope};
 use tetdb_base::storage::attempt;

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::columns::{TableColumn, column, put_row};
+use super::columns::{TableColumn, column, field_columns, put_row};
 use super::error::Result;
 use super::faces::MergedFace;
 use super::merged::{Measured, Merged, MergedTet};
@@ -77,21 +77,25 @@ where
 pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     mesh.expect_passes(1, 1);
     let n_vertices = mesh.n_vertices();
-    let columns = vec![
-        column("points", |vertex: &SealedVertex| vertex.point),
-        column("vertex_id", |vertex: &SealedVertex| vertex.id as i64),
+    type VertexRow = (SealedVertex, Vec<u64>);
+    let [at_vertices, at_tets] = mesh.read_fields(false)?;
+    let mut columns = vec![
+        column("points", |row: &VertexRow| row.0.point),
+        column("vertex_id", |row: &VertexRow| row.0.id as i64),
     ];
+    columns.extend(field_columns(&at_vertices, |row: &VertexRow| &row.1));
     let mut arrays = Arrays::create(outputs, out, n_vertices, columns)?;
-    mesh.vertices(|_, vertex| arrays.row(vertex))?;
+    mesh.vertices_with(&at_vertices, |_, vertex, words| arrays.row(&(*vertex, words.to_vec())))?;
     arrays.finish()?;
 
-    let columns = vec![
+    let mut columns = vec![
         vertex_numbers("tets", n_vertices, |tet: &MergedTet| tet.nodes),
         column("region", |tet: &MergedTet| tet.region),
         column("subdomain", |tet: &MergedTet| tet.subdomain),
         column("quality", |tet: &MergedTet| tet.quality),
         column("global_id", |tet: &MergedTet| tet.id.number() as i64),
     ];
+    columns.extend(field_columns(&at_tets, |tet: &MergedTet| &tet.fields));
     let mut arrays = Arrays::create(outputs, out, mesh.n_tets(), columns)?;
     mesh.measured_tets(Measured::Quality, |tet| arrays.row(tet))?;
     arrays.finish()?;

@@ -9,11 +9,13 @@ use std::path::{Path, PathBuf};
 
 use super::columns::Number;
 use super::dispatch;
-use super::merged::{Merged, ReadProgress};
+use super::merged::Merged;
 use super::output_files::OutputFiles;
+use super::read_progress::ReadProgress;
 use super::scope::{FaceSet, Scope};
 use super::stream::Stream;
 use super::{ExportSelection, FileCounts, MeshFormat, Result, WriteError, vtk};
+use tetdb_schema::field::{FieldPlace, FieldRow};
 use tetdb_store::store::Catalog;
 
 pub(super) fn write(
@@ -71,7 +73,11 @@ pub(super) fn write(
         }
     }
     if names_all {
-        head(outputs, out, &pieces)?;
+        let is_second = selection.order == super::ElementOrder::Second;
+        let (at_vertices, at_tets): (Vec<_>, Vec<_>) =
+            store.fields()?.into_iter().partition(|f| f.place == FieldPlace::Vertices);
+        let at_vertices = if is_second { Vec::new() } else { at_vertices };
+        head(outputs, out, &pieces, [&at_vertices, &at_tets])?;
     }
     Ok(counts)
 }
@@ -83,21 +89,33 @@ pub(super) fn piece_path(out: &Path, rank: u32, extension: &str) -> PathBuf {
 }
 
 /// The file that names the pieces. Arrays as in `vtu`. Source: the VTK file formats document, "Parallel file formats".
-fn head(outputs: &mut OutputFiles, out: &Path, pieces: &[PathBuf]) -> Result<()> {
+fn head(
+    outputs: &mut OutputFiles,
+    out: &Path,
+    pieces: &[PathBuf],
+    [at_vertices, at_tets]: [&[FieldRow]; 2],
+) -> Result<()> {
     let path = outputs.create(out, 2000)?;
     let mut stream = Stream::open(&path)?;
     stream.text(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
          header_type=\"UInt64\">\n  <PUnstructuredGrid GhostLevel=\"0\">\n",
     );
-    let arrays = |columns: Vec<(Cow<'static, str>, Number)>| -> String {
-        let line = |(name, number): (Cow<'static, str>, Number)| {
-            format!("      <PDataArray type=\"{}\" Name=\"{name}\"/>\n", number.vtk())
+    type Described = (Cow<'static, str>, Number, u64);
+    let arrays = |columns: Vec<Described>| -> String {
+        let line = |(name, number, components): Described| {
+            let components = match components {
+                1 => String::new(),
+                n => format!(" NumberOfComponents=\"{n}\""),
+            };
+            format!("      <PDataArray type=\"{}\" Name=\"{name}\"{components}/>\n", number.vtk())
         };
         columns.into_iter().map(line).collect()
     };
-    let points = vtk::vertex_columns().iter().map(|c| (c.name.clone(), c.number)).collect();
-    let cells = vtk::tet_columns().iter().map(|c| (c.name.clone(), c.number)).collect();
+    let points = vtk::vertex_columns(at_vertices);
+    let points = points.iter().map(|c| (c.name.clone(), c.number, c.components)).collect();
+    let cells = vtk::tet_columns(at_tets);
+    let cells = cells.iter().map(|c| (c.name.clone(), c.number, c.components)).collect();
     for (group, columns) in [("PPointData", points), ("PCellData", cells)] {
         stream.text(&format!("    <{group}>\n{}    </{group}>\n", arrays(columns)));
     }

@@ -1,7 +1,7 @@
 //! All files and records that cannot be read as they were written, with their places.
 //!
 //! [`verify`](super::verify) reads the mesh itself, chunk by chunk. This module reads every file that counts, also kept ones:
-//! coarse snapshots, previous versions, stages.
+//! coarse snapshots, previous versions, stages, fields.
 
 use crate::store::{Catalog, StoreError};
 use tetdb_base::storage::check_cancelled;
@@ -12,7 +12,7 @@ const MEMORY_BYTES: usize = 8 << 20;
 /// Greatest number of listed faults.
 const LISTED_MAX: usize = 1000;
 
-/// Lists the damage in the files of sub-domains, coarse snapshots, previous versions and stages, in that order.
+/// Lists the damage in the files of sub-domains, coarse snapshots, previous versions, stages and fields, in that order.
 ///
 /// Errors: a damaged catalog, because it lists the files; failures of the disk that are no damage.
 pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
@@ -73,6 +73,19 @@ impl DamageFound {
         }
         for stage in store.stages()? {
             self.add_part(store, stage.row)?;
+        }
+        self.add_fields(store)
+    }
+
+    fn add_fields(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
+        for row in store.subdomains()? {
+            for field in store.fields()? {
+                // A damaged sub-domain is listed elsewhere.
+                let Ok(part) = store.open_row(row.clone(), MEMORY_BYTES) else { break };
+                let opened = store.open_field(&field, &part, MEMORY_BYTES);
+                let checked = opened.and_then(|mut values| Ok(values.check()?));
+                self.note(checked)?;
+            }
         }
         Ok(())
     }

@@ -56,9 +56,10 @@ impl QuerySession {
             .collect();
         let mut promises = Vec::new();
         for rank in ranks {
+            let ranges = self.extra_ranges(rank, &selection.condition_extra)?;
             let part = &self.part(rank)?.subdomain;
             for (chunk, summary) in (0u32..).zip(part.tet_summaries()) {
-                if selection.may_be_among(rank, summary) {
+                if selection.may_be_among(rank, summary, ranges.of(chunk)) {
                     // Summaries round to the nearest.
                     let [least, most] = summary.quality;
                     let quality = match sign > 0.0 {

@@ -1,5 +1,6 @@
 //! A tetrahedron as an answer, and its named values.
 
+use tetdb_schema::field::Scalar;
 use tetdb_schema::ids::TetId;
 
 use crate::sealed::Shape;
@@ -25,6 +26,9 @@ pub const VARIABLES: [&str; 12] = [
     "excess",
 ];
 
+/// Most numbers of fields in one answer.
+pub const EXTRA_MAX: usize = 9;
+
 /// The place of `excess` among the [`VARIABLES`]: the one that needs the surface.
 pub(super) const EXCESS: usize = VARIABLES.len() - 1;
 
@@ -43,12 +47,22 @@ pub struct Hit {
     pub shape: Shape,
     /// True for the faces that are input triangles, each opposite the vertex of its place; known for questions about excess.
     pub on_surface: Option<[bool; 4]>,
+    /// Values of the variables of [`Selection::extra`](super::Selection::extra); zeros behind them.
+    pub extra: [Scalar; EXTRA_MAX],
 }
 
 impl Hit {
     /// A hit with its shape measured.
     pub fn new(id: TetId, region: u32, vertices: [u64; 4], corners: [Point; 4]) -> Self {
-        Self { id, region, vertices, corners, shape: Shape::new(corners), on_surface: None }
+        Self {
+            id,
+            region,
+            vertices,
+            corners,
+            shape: Shape::new(corners),
+            on_surface: None,
+            extra: [Scalar::Float(0.0); EXTRA_MAX],
+        }
     }
 
     /// The mean of its corners.
@@ -76,6 +90,14 @@ impl Hit {
     /// Quality over the least that the faces on the surface allow any tetrahedron; NaN where these are not known.
     pub fn excess(&self) -> f64 {
         (self.on_surface).map_or(f64::NAN, |faces| excess(self.corners, faces))
+    }
+
+    /// A value of [`VARIABLES`], or of `extra` behind them.
+    pub fn value(&self, variable: usize) -> f64 {
+        match variable.checked_sub(VARIABLES.len()) {
+            Some(i) => self.extra[i].to_f64(),
+            None => self.values()[variable],
+        }
     }
 
     /// The values of [`VARIABLES`].

@@ -5,7 +5,7 @@
 //! exact signs. Answers are iterators; this module has no file formats.
 //!
 //! Reading order: `solid` (boxes, balls, planes) on `exact`; `decoded` (a decoded chunk) and `tree`; `session` (open files and caches); `locate`
-//! (points), `lazy` (a single point); `hit` (a tetrahedron with its values); `selection` (conditions), `marks` (tetrahedra on the surface and on
+//! (points), `lazy` (a single point); `hit` (a tetrahedron with its values), `extra` (fields); `selection` (conditions), `marks` (tetrahedra on the surface and on
 //! interfaces), `surface_faces` (required faces), `select` (the hits in order of id), `order` (sorted), `extreme` (the worst few), `around`
 //! (tetrahedra around vertices and edges, neighbors).
 
@@ -13,6 +13,7 @@ mod around;
 mod decoded;
 mod error;
 mod exact;
+mod extra;
 mod extreme;
 mod hit;
 mod lazy;
@@ -28,7 +29,8 @@ mod surface_faces;
 mod tree;
 
 pub use error::QueryError;
-pub use hit::{Hit, VARIABLES};
+pub use extra::ExtraVariable;
+pub use hit::{EXTRA_MAX, Hit, VARIABLES};
 pub use locate::LocatedPoint;
 pub use order::Ordered;
 pub use select::Selected;

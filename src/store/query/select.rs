@@ -3,6 +3,7 @@
 use std::vec::IntoIter;
 
 use tetdb_schema::ids::TetId;
+use tetdb_schema::record::SealedTet;
 
 use super::hit::Hit;
 use super::locate::leaders;
@@ -97,12 +98,13 @@ impl Selected<'_> {
         self.rank = rank;
         self.marks = None;
         let marks = self.session.marks(rank, &self.selection)?;
+        let ranges = self.session.extra_ranges(rank, &self.selection.condition_extra)?;
         let part = self.session.part(rank)?;
         let mut chunks = Vec::new();
         for (chunk, summary) in (0u32..).zip(part.subdomain.tet_summaries()) {
             let marked = marks.as_ref().is_none_or(|m| m.any(summary.first, summary.count));
             if marked
-                && self.selection.may_be_among(rank, summary)
+                && self.selection.may_be_among(rank, summary, ranges.of(chunk))
                 && (!self.selection.is_local()
                     || is_led_near(&part.subdomain, &self.selection, chunk as usize))
             {
@@ -160,19 +162,41 @@ pub(super) fn hits_in(
         true => Some(session.surface_of(rank)?),
         false => None,
     };
-    let mut on_surface = Vec::new();
+    let needs_extra = !selection.extra.is_empty() || !selection.condition_extra.is_empty();
+    let (mut on_surface, mut kept) = (Vec::new(), Vec::new());
     let frame = session.frame(rank, chunk, |part, local, tet| {
         let keep = marks.as_ref().is_none_or(|m| m.has(local))
             && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
             && (!selection.is_local() || nearby.may_meet(part, selection, chunk, tet.nodes));
         if keep {
             on_surface.push(surface.as_ref().map(|faces| faces.of(local, tet)));
+            if needs_extra {
+                kept.push((local, *tet));
+            }
         }
         keep
     })?;
     let found = frame.tets.iter().zip(on_surface);
     let found = found.map(|(tet, on_surface)| Hit { on_surface, ..frame.hit(tet) });
-    Ok(found.filter(|found| selection.holds(found)).collect())
+    if !needs_extra {
+        return Ok(found.filter(|found| selection.holds(found, &[])).collect());
+    }
+    let of_condition = session.extra_values(rank, &selection.condition_extra, &kept)?;
+    let n = selection.condition_extra.len();
+    let mut place = 0..kept.len();
+    let (mut hits, tets): (Vec<Hit>, Vec<(u32, SealedTet)>) = found
+        .zip(&kept)
+        .filter(|(hit, _)| {
+            let i = place.next().expect("a place for each");
+            selection.holds(hit, &of_condition[i * n..(i + 1) * n])
+        })
+        .map(|(hit, tet)| (hit, *tet))
+        .unzip();
+    let values = session.extra_values(rank, &selection.extra, &tets)?;
+    for (hit, values) in hits.iter_mut().zip(values.chunks(selection.extra.len().max(1))) {
+        hit.extra[..values.len()].copy_from_slice(values);
+    }
+    Ok(hits)
 }
 
 /// Places of a chunk that matter to a selection: all vertices of a tetrahedron that meets it are within the length of its longest edge.

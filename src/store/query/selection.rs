@@ -1,8 +1,10 @@
 //! Conditions on tetrahedra, and their consequences for summaries.
 
 use tetdb_schema::chunk::TetSummary;
+use tetdb_schema::field::Scalar;
 use tetdb_schema::ids::TetId;
 
+use super::extra::ExtraVariable;
 use super::hit::{EXCESS, Hit, ranges};
 use super::solid::Solid;
 use crate::sealed::input_index;
@@ -36,6 +38,10 @@ pub struct Selection {
     pub condition: Option<Expression>,
     /// True if the excess of the hits is needed, also without a condition on it.
     pub excess: bool,
+    /// Variables of the condition behind [`VARIABLES`](super::VARIABLES).
+    pub condition_extra: Vec<ExtraVariable>,
+    /// Variables that the hits are to have, at most [`EXTRA_MAX`](super::EXTRA_MAX).
+    pub extra: Vec<ExtraVariable>,
 }
 
 /// Vertices, some of which a tetrahedron must have.
@@ -72,7 +78,12 @@ impl Selection {
     }
 
     /// Returns whether a chunk of a sub-domain may have hits.
-    pub(super) fn may_be_among(&self, rank: u32, chunk: &TetSummary) -> bool {
+    pub(super) fn may_be_among(
+        &self,
+        rank: u32,
+        chunk: &TetSummary,
+        extra: (&[[f64; 2]], &[bool]),
+    ) -> bool {
         let [low, high] = chunk.bounds.map(Point::from_array);
         let [least, most] = chunk.regions;
         let within = |r: &u32| (least..=most).contains(r);
@@ -82,7 +93,7 @@ impl Selection {
         self.regions.as_ref().is_none_or(|l| l.iter().any(within))
             && self.tets.as_ref().is_none_or(|l| l.iter().any(listed))
             && self.may_meet(&Aabb { low, high })
-            && self.condition.as_ref().is_none_or(|e| e.may_hold(&ranges(chunk, rank)))
+            && self.condition.as_ref().is_none_or(|e| may_hold(e, &ranges(chunk, rank), extra))
     }
 
     /// Returns whether tetrahedra within `bounds` may satisfy the conditions on places.
@@ -108,7 +119,9 @@ impl Selection {
     }
 
     /// Returns whether the tetrahedron satisfies the conditions on its vertices and values.
-    pub(super) fn holds(&self, tet: &Hit) -> bool {
+    ///
+    /// `extra`: values of the condition's extra variables.
+    pub(super) fn holds(&self, tet: &Hit, extra: &[Scalar]) -> bool {
         let solid = |s: &Solid| match self.inside {
             true => s.holds(&tet.corners),
             false => s.meets(&tet.corners),
@@ -117,6 +130,27 @@ impl Selection {
         self.solids.iter().all(solid)
             && (!self.touching_surface || tet.vertices.iter().any(is_input))
             && self.sharing.as_ref().is_none_or(|s| s.holds(tet.id, &tet.vertices))
-            && self.condition.as_ref().is_none_or(|e| e.truth(&tet.values()))
+            && self.condition.as_ref().is_none_or(|e| truth(e, tet, extra))
     }
+}
+
+fn may_hold(
+    condition: &Expression,
+    own: &[[f64; 2]],
+    (extra, nan): (&[[f64; 2]], &[bool]),
+) -> bool {
+    if extra.is_empty() {
+        return condition.may_hold(own);
+    }
+    let nan = [&vec![false; own.len()][..], nan].concat();
+    condition.may_hold_with(&[own, extra].concat(), &nan)
+}
+
+fn truth(condition: &Expression, tet: &Hit, extra: &[Scalar]) -> bool {
+    if extra.is_empty() {
+        return condition.truth(&tet.values());
+    }
+    let mut values = tet.values().to_vec();
+    values.extend(extra.iter().map(|value| value.to_f64()));
+    condition.truth(&values)
 }

@@ -11,7 +11,7 @@ use super::QueryError;
 use super::decoded::{DecodedChunk, Searched};
 use super::surface_faces::SurfaceFaces;
 use super::tree::OctalBoxTree;
-use crate::sealed::{Chunk, Subdomain};
+use crate::sealed::{Chunk, FieldFile, Subdomain};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Budget, Lease, check_cancelled};
@@ -48,6 +48,19 @@ pub struct OpenSubdomain {
     /// Over the boxes of its chunks of tetrahedra.
     pub(super) tree: OctalBoxTree,
     _lease: Option<Lease>,
+}
+
+/// An open file of a field.
+pub(super) struct OpenField {
+    pub file: FieldFile,
+    _lease: Lease,
+}
+
+impl OpenField {
+    /// A file whose memory is leased.
+    pub fn new(file: FieldFile, lease: Lease) -> Self {
+        Self { file, _lease: lease }
+    }
 }
 
 /// A store open for questions.
@@ -90,8 +103,10 @@ pub struct QuerySession {
     /// Over the boxes of the sub-domains.
     pub(super) tree: OctalBoxTree,
     bounds: Aabb,
-    parts: LruCache<u32, OpenSubdomain>,
+    pub(super) parts: LruCache<u32, OpenSubdomain>,
     parts_max: usize,
+    /// By number of the field and rank.
+    pub(super) fields: LruCache<(u32, u32), OpenField>,
     frames: LruCache<(u32, u32), Arc<Searched>>,
     frames_bytes: usize,
     frames_bytes_max: usize,
@@ -168,6 +183,7 @@ impl QuerySession {
             bounds,
             parts: LruCache::unbounded(),
             parts_max: parts_max as usize,
+            fields: LruCache::unbounded(),
             frames: LruCache::unbounded(),
             frames_bytes: 0,
             frames_bytes_max: frames_bytes_max as usize,

@@ -307,6 +307,9 @@ impl Catalog {
         for file in &step.coarse_listed {
             self.coarse_path(file.subdomain, file.generation).sync_file()?;
         }
+        for &file in &step.field_listed {
+            self.field_path(file).sync_file()?;
+        }
         self.dir.sync_dir()?;
         match self.in_place {
             true => self.file.change(step.rows())?,
@@ -315,6 +318,9 @@ impl Catalog {
         self.journal_rows = step.journal_rows;
         for file in &step.unlisted {
             self.file_path(file.subdomain, file.generation).remove_file()?;
+        }
+        for &file in &step.field_unlisted {
+            self.field_path(file).remove_file()?;
         }
         Ok(())
     }
@@ -342,11 +348,12 @@ impl Catalog {
         }
     }
 
-    /// Removes sub-domain files the catalog does not list, what an interrupted commit left, and scratch.
+    /// Removes files of sub-domains and fields the catalog does not list, what an interrupted commit left, and scratch.
     fn purge(&mut self) -> Result<(), StoreError> {
         let is_finished = self.state()?.is_finished();
         let listed = self.files()?;
         let coarse: Vec<FileRow> = (self.coarse_snapshots()?.iter()).map(CoarseRow::file).collect();
+        let fields = self.field_files()?;
         for name in self.dir.list()? {
             let path = self.dir.join(&name);
             let is_stray = |file: Option<FileRow>, listed: &[FileRow]| {
@@ -356,6 +363,7 @@ impl Catalog {
             if is_draft
                 || is_stray(FileRow::from_subdomain_name(&name), &listed)
                 || is_stray(FileRow::from_coarse_name(&name), &coarse)
+                || is_stray(FileRow::from_field_name(&name), &fields)
             {
                 path.remove_file()?;
             } else if name == SCRATCH || name == WORK && is_finished {
@@ -494,7 +502,7 @@ impl Catalog {
     ///
     /// Names of unlisted files may be used again, also by a new store at the same path. So when the store has been
     /// changed, a file is valid only if the new catalog has the same row for it. Errors: [`StoreError::Changed`]; that of `opened`.
-    fn of_one_state<T>(
+    pub(super) fn of_one_state<T>(
         &self,
         opened: Result<T, SealedError>,
         is_listed: impl FnOnce(&mut Self) -> Result<bool, StoreError>,
@@ -614,7 +622,7 @@ impl Catalog {
         Ok(self.file.compact()?)
     }
 
-    fn damaged_row(&self, key: u64, reason: impl Into<String>) -> StoreError {
+    pub(super) fn damaged_row(&self, key: u64, reason: impl Into<String>) -> StoreError {
         StoreError::Row { path: self.file.path().to_owned(), key, reason: reason.into() }
     }
 
@@ -635,7 +643,7 @@ impl Catalog {
         read.transpose().map_err(|e| self.damaged_row(key, e))
     }
 
-    fn rows<T: Archivable>(&mut self, kind: RowKind) -> Result<Vec<T>, StoreError> {
+    pub(super) fn rows<T: Archivable>(&mut self, kind: RowKind) -> Result<Vec<T>, StoreError> {
         let mut all = Vec::new();
         let mut wrong = None;
         self.file.scan(kind.keys(), |key, value| {

@@ -7,6 +7,7 @@
 
 mod catalog;
 mod error;
+mod fields;
 mod step;
 #[cfg(test)]
 mod tests;

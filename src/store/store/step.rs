@@ -18,6 +18,10 @@ pub struct Step {
     pub(super) unlisted: BTreeSet<FileRow>,
     /// Coarse snapshots to list.
     pub(super) coarse_listed: BTreeSet<FileRow>,
+    /// Files of fields to list.
+    pub(super) field_listed: BTreeSet<FileRow>,
+    /// Files of fields to remove after the commit.
+    pub(super) field_unlisted: BTreeSet<FileRow>,
     pub(super) journal_rows: u32,
 }
 
@@ -28,6 +32,8 @@ impl Step {
             listed: BTreeSet::new(),
             unlisted: BTreeSet::new(),
             coarse_listed: BTreeSet::new(),
+            field_listed: BTreeSet::new(),
+            field_unlisted: BTreeSet::new(),
             journal_rows,
         }
     }
@@ -41,7 +47,7 @@ impl Step {
         self.changes.insert(key, Some(rows::guarded_bytes(key, bytes)));
     }
 
-    fn put(&mut self, key: u64, row: &impl Archivable) {
+    pub(super) fn put(&mut self, key: u64, row: &impl Archivable) {
         self.changes.insert(key, Some(rows::encode(key, row)));
     }
 

@@ -208,3 +208,70 @@ fn a_damaged_file_is_an_error_that_names_the_place() -> Outcome {
     assert!(no_error(read()).is_damage());
     Ok(())
 }
+
+/// A field at vertices and one at tetrahedra: values, ranges, a flipped bit, a file that is not listed.
+#[test]
+fn fields_are_kept_beside_the_mesh() -> Outcome {
+    use crate::audit::damage;
+    use crate::sealed::FieldWriter;
+    use tetdb_schema::field::{FieldNumber, FieldPlace, FieldRow, Scalar};
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("a.tetdb");
+    two_subdomains(&path)?;
+    let mut catalog = Catalog::open_writable(&path)?;
+    let field = |id, name: &str, place, number, components| FieldRow {
+        id,
+        name: name.to_owned(),
+        place,
+        number,
+        components,
+    };
+    let fields = [
+        field(1, "u", FieldPlace::Vertices, FieldNumber::F64, 3),
+        field(2, "n", FieldPlace::Tets, FieldNumber::I32, 1),
+    ];
+    let mut parts = Vec::new();
+    for field in &fields {
+        for row in catalog.subdomains()? {
+            let mut mesh = catalog.open_row(row.clone(), 4 << 20)?;
+            let file = FileRow { subdomain: row.rank, generation: field.id };
+            let path = catalog.field_path(file);
+            let mut writer = FieldWriter::create(path, field, &mesh, field.id, 4 << 20)?;
+            let values: Vec<f64> = match field.place {
+                FieldPlace::Tets => vec![-7.0],
+                FieldPlace::Vertices => (0..12).map(|i| f64::from(i) * 0.5).collect(),
+            };
+            let word = |x: &f64| field.number.pack(Scalar::Float(*x)).expect("it fits");
+            writer.push(&values.iter().map(word).collect::<Vec<_>>())?;
+            parts.push(writer.finish(&mut mesh)?);
+        }
+    }
+    catalog.commit(|step| {
+        fields.iter().for_each(|field| step.set_field(field));
+        parts.iter().for_each(|part| step.set_field_part(part));
+        Ok(())
+    })?;
+    std::fs::write(path.join("field-00000-g9.redb"), b"stray")?;
+    drop(catalog);
+    drop(Catalog::open_writable(&path)?);
+    assert!(!path.join("field-00000-g9.redb").exists());
+    let mut catalog = Catalog::open(&path)?;
+    assert_eq!((catalog.fields()?, catalog.field_parts()?), (fields.to_vec(), parts.clone()));
+    assert_eq!(parts[0].ranges[1].high, 5.0);
+    let mesh = catalog.open_subdomain(1, 4 << 20)?;
+    let mut u = catalog.open_field(&fields[0], &mesh, 1 << 20)?;
+    assert_eq!(f64::from_bits(u.word(2, 1)?), 3.5);
+    assert_eq!(u.chunk(0)?.len(), 12);
+    assert_eq!(u.range_over(0, 2), ([1.0, 5.5], false));
+    assert!(u.word(4, 0).is_err());
+    assert!(damage(&mut catalog)?.is_empty());
+    // A file at the place of another one is damage, and so is a flipped bit; both name the field.
+    let [own, other] = [0, 1].map(|rank| path.join(format!("field-0000{rank}-g2.redb")));
+    let good = std::fs::read(&own)?;
+    std::fs::copy(&other, &own)?;
+    let found = damage(&mut catalog)?;
+    assert!(found.len() == 1 && found[0].to_string().contains("field n, chunk 0"), "{found:?}");
+    std::fs::write(&own, &good)?;
+    assert!(damage(&mut catalog)?.is_empty());
+    Ok(())
+}

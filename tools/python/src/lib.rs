@@ -1,10 +1,11 @@
 //! The native half of the Python package `tetdb`: arrays in and out of the library's front door.
 //!
-//! Reading order: `failure` (errors), `watched` (work that can be interrupted), `surface`, `sizes` and `run` (what is asked for), `tasks` (many processes), `store` and
-//! `part` (a finished mesh). Shapes, defaults, docstrings and reports are the Python half's; this half checks nothing that half has
+//! Reading order: `failure` (errors), `watched` (work that can be interrupted), `surface`, `sizes` and `run` (what is asked for), `tasks` (many processes), `store`,
+//! `part` and `field` (a finished mesh). Shapes, defaults, docstrings and reports are the Python half's; this half checks nothing that half has
 //! checked, and the library checks the rest. Is not: public; its names may change.
 
 mod failure;
+mod field;
 mod part;
 mod run;
 mod sizes;
@@ -19,6 +20,8 @@ use pyo3::prelude::*;
 mod _native {
     use super::*;
 
+    #[pymodule_export]
+    use super::field::Field;
     #[pymodule_export]
     use super::part::{Part, qualities};
     #[pymodule_export]

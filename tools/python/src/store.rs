@@ -7,9 +7,13 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde_json::json;
 use tetdb::data::Hit;
-use tetdb::{CancelToken, ColorBy, ExportOptions, Order, Snapshot, VerifyLevel};
+use tetdb::{
+    CancelToken, ColorBy, ExportOptions, FieldIds, FieldPlace, FieldSource, NewField, Order,
+    Snapshot, VerifyLevel, Word,
+};
 
 use crate::failure::Failure;
+use crate::field::Field;
 use crate::part::Part;
 use crate::run::SettingWords;
 use crate::sizes::SizeWords;
@@ -357,6 +361,41 @@ impl Store {
             remesh.run()?;
             Ok(())
         })
+    }
+
+    /// The fields, as JSON.
+    fn fields(&self, py: Python<'_>) -> PyResult<String> {
+        self.alone(py, |store| Ok(json!(store.fields()?).to_string()))
+    }
+
+    fn field(&self, py: Python<'_>, name: &str, rank: u32) -> PyResult<Field> {
+        self.alone(py, |store| Ok(Field::new(store.field(name, rank)?)))
+    }
+
+    /// Adds a field from a file, or from an expression.
+    fn add_field(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        at: &str,
+        source: &str,
+        is_file: bool,
+        ids: Option<PathBuf>,
+    ) -> PyResult<()> {
+        let place = FieldPlace::from_word(at).unwrap_or(FieldPlace::Tets);
+        let ids = ids.map_or(FieldIds::AsFound, FieldIds::File);
+        let source = match is_file {
+            true => FieldSource::File(source.into(), ids),
+            false => FieldSource::Expression(source.to_owned()),
+        };
+        let new = NewField::new(name, place);
+        self.changed(py, None, move |mut store| {
+            Ok(store.add_field_from(&new, &source).map(drop)?)
+        })
+    }
+
+    fn drop_field(&self, py: Python<'_>, name: &str) -> PyResult<()> {
+        self.changed(py, None, |mut store| Ok(store.drop_field(name)?))
     }
 
     fn undo(&self, py: Python<'_>) -> PyResult<()> {

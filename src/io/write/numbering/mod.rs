@@ -18,7 +18,7 @@ use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 
 use super::error::Result;
 use super::stream::{RecordReader, save};
-use tetdb_base::storage::{Sorted, Sorter, sort_record};
+use tetdb_base::storage::{Sorted, Sorter, StorageError, sort_record};
 use tetdb_store::sealed::{MergeReader, SealedError};
 use tetdb_store::store::Catalog;
 
@@ -301,6 +301,26 @@ impl Numbering {
         }
         Ok(part)
     }
+}
+
+/// Calls `each` with the number that an export gives each vertex, the rank of its sub-domain and its number there, in the order of these.
+///
+/// Holds about `memory` bytes, and keeps scratch files in `dir`. Errors: damage, the disk; those of `each`.
+pub fn each_vertex_number(
+    store: &mut Catalog,
+    dir: &Path,
+    memory: usize,
+    mut each: impl FnMut(u64, u32, u32) -> std::result::Result<(), StorageError>,
+) -> Result<()> {
+    let parts: Vec<Source> = store.subdomains()?.into_iter().map(Source::from).collect();
+    let numbering = Numbering::new(store, &parts, false, dir, memory)?;
+    for (p, source) in parts.iter().enumerate() {
+        let numbers = numbering.part(store, &parts, p)?;
+        for local in 0..source.row.vertices as u32 {
+            each(numbers.dense_vertex(local), source.row.rank, local)?;
+        }
+    }
+    Ok(())
 }
 
 /// All vertices that are written and that another sub-domain may also have, by id.

@@ -11,7 +11,7 @@ mod selected;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::columns::{TableColumn, column};
+use super::columns::{TableColumn, column, field_columns};
 use super::error::{Result, WriteError};
 use super::merged::{Measured, Merged, MergedTet};
 use super::midpoints::Midpoints;
@@ -24,24 +24,33 @@ pub use defects::defects;
 use grid::{Container, VtkGrid};
 pub use selected::{SelectedTet, SelectedVtu};
 use tetdb_base::storage::RemoteFailure;
+use tetdb_schema::field::FieldRow;
 
-/// Columns of the vertices, whose rows are lasting ids.
-pub(super) fn vertex_columns() -> Vec<TableColumn<i64>> {
-    vec![column("global_id", |id: &i64| *id)]
+/// A vertex: its lasting id, and the words of its fields.
+pub(super) type VertexRow = (i64, Vec<u64>);
+
+/// Columns of the vertices.
+pub(super) fn vertex_columns(fields: &[FieldRow]) -> Vec<TableColumn<VertexRow>> {
+    let mut columns = vec![column("global_id", |row: &VertexRow| row.0)];
+    columns.extend(field_columns(fields, |row: &VertexRow| &row.1));
+    columns
 }
 
 /// Columns of the tetrahedra.
-pub(super) fn tet_columns() -> Vec<TableColumn<MergedTet>> {
-    vec![
+pub(super) fn tet_columns(fields: &[FieldRow]) -> Vec<TableColumn<MergedTet>> {
+    let mut columns = vec![
         column("subdomain", |tet: &MergedTet| tet.subdomain),
         column("region", |tet: &MergedTet| tet.region),
         column("quality", |tet: &MergedTet| tet.quality),
         column("excess", |tet: &MergedTet| tet.excess),
         column("global_id", |tet: &MergedTet| tet.id.number() as i64),
-    ]
+    ];
+    columns.extend(field_columns(fields, |tet: &MergedTet| &tet.fields));
+    columns
 }
 
-type TetGrid = VtkGrid<i64, MergedTet>;
+/// A grid, and the fields at its vertices.
+type TetGrid = (VtkGrid<VertexRow, MergedTet>, Vec<FieldRow>);
 
 /// Writes both files. Several processes may write partitions of a `.vtkhdf`, whose mesh numbers the vertices of each sub-domain apart.
 pub(super) fn write(
@@ -61,10 +70,13 @@ pub(super) fn write(
     let [n_points, n_tets, _] = rows(&partitions);
     let counts = [n_points, n_tets, if midpoints.is_some() { 10 } else { 4 }];
     let texts = ("region_names", &*mesh.region_names());
-    let grid = VtkGrid::new(&container, counts, texts, vertex_columns(), tet_columns());
+    let [at_vertices, at_tets] = mesh.read_fields(midpoints.is_some())?;
+    let columns = (vertex_columns(&at_vertices), tet_columns(&at_tets));
+    let grid = VtkGrid::new(&container, counts, texts, columns.0, columns.1);
+    let grid = (grid, at_vertices);
     let mut begin = || {
-        let path = outputs.create(out, grid.file_bytes())?;
-        grid.begin(&path).map(|()| path)
+        let path = outputs.create(out, grid.0.file_bytes())?;
+        grid.0.begin(&path).map(|()| path)
     };
     let n = partitions.len();
     let Some(writers) = writers else {
@@ -115,23 +127,24 @@ fn write_partitions(
     midpoints: Option<&Midpoints>,
 ) -> Result<()> {
     let partitions = &all[which.clone()];
+    let (grid, fields) = grid;
     let mut file = grid.open_rows(path, rows(&all[..which.start]), rows(partitions))?;
     // The midpoints of a partition follow its vertices.
     let mut positions = midpoints.map(Midpoints::points).transpose()?;
     let mut ends = partitions.iter().map(|p| (p.first_vertex + p.n_vertices, p.n_midpoints));
     let mut end = ends.next();
-    mesh.vertices(|number, vertex| {
+    mesh.vertices_with(fields, |number, vertex, words| {
         while let Some((_, n)) = end.filter(|(end, _)| number >= *end) {
             for position in positions.iter_mut().flat_map(|p| p.by_ref().take(n as usize)) {
-                file.point(&NO_ID, position?)?;
+                file.point(&(NO_ID, Vec::new()), position?)?;
             }
             end = ends.next();
         }
-        file.point(&(vertex.id as i64), vertex.point)
+        file.point(&(vertex.id as i64, words.to_vec()), vertex.point)
     })?;
     for (_, n) in end.into_iter().chain(ends) {
         for position in positions.iter_mut().flat_map(|p| p.by_ref().take(n as usize)) {
-            file.point(&NO_ID, position?)?;
+            file.point(&(NO_ID, Vec::new()), position?)?;
         }
     }
     let mut part = &partitions[0];

@@ -20,6 +20,7 @@ from ._mesh import Comparison, compare, mesh, open, resume, tetrahedralize
 from ._native import __version__
 from ._options import Event
 from ._sizes import Box, Cylinder, Field, Function, InRegion, NearLabel, Sphere
+from ._fields import Field, Fields
 from ._store import Chunk, Merged, Quality, Region, Store, Subdomain, SubdomainInfo, Verification
 from ._surface import CheckReport, Defects, Estimate, Surface, sample
 from ._tasks import begin, gather, plan, run_task
@@ -33,6 +34,8 @@ __all__ = [
     "Defects",
     "Estimate",
     "Event",
+    "Field",
+    "Fields",
     "Field",
     "Function",
     "InRegion",

@@ -99,6 +99,7 @@ _CLASSES: dict[str, type[TetdbError]] = {
         "nothing-filled",
         "contradicting-orientation",
         "surface-changed",
+        "bad-field",
         "bad-seed",
         "sheet-outside",
         "wire-outside",

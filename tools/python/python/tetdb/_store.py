@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from . import _native, _options, _sizes
 from ._errors import TetdbError, needed
+from ._fields import Fields
 from ._options import Progress
 from ._sizes import Length, Size
 
@@ -278,6 +279,11 @@ class Store:
     def digest(self) -> str:
         """One number for the mesh, the same for equal meshes: 32 hexadecimal digits."""
         return str(self._said()["digest"])
+
+    @property
+    def fields(self) -> Fields:
+        """Values kept with the mesh, by name: ``st.fields["T"] = array``, ``st.fields["T"].chunks()``, ``del st.fields["T"]``."""
+        return Fields(self)
 
     @property
     def is_verified(self) -> bool:

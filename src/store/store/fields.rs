@@ -1,0 +1,143 @@
+//! Fields in the catalog.
+
+use tetdb_schema::catalog::FileRow;
+use tetdb_schema::field::{COMPONENTS, FieldPart, FieldPlace, FieldRow};
+use tetdb_schema::row::RowKind;
+
+use super::{Catalog, Step, StoreError};
+use crate::sealed::{FieldFile, Subdomain};
+use tetdb_base::storage::DiskPath;
+
+impl Catalog {
+    /// All fields, in the order in which they were added.
+    pub fn fields(&mut self) -> Result<Vec<FieldRow>, StoreError> {
+        let rows: Vec<FieldRow> = self.rows(RowKind::Field)?;
+        match rows.iter().find(|row| !COMPONENTS.contains(&row.components)) {
+            Some(row) => {
+                let reason = "gives a field a number of components that none has";
+                Err(self.damaged_row(RowKind::Field.key(0, row.id), reason))
+            }
+            None => Ok(rows),
+        }
+    }
+
+    /// The values of all fields, by field and rank.
+    pub fn field_parts(&mut self) -> Result<Vec<FieldPart>, StoreError> {
+        let parts = self.rows(RowKind::FieldPart)?;
+        self.checked_parts(parts)
+    }
+
+    /// Values that belong to the previous versions of sub-domains.
+    pub fn previous_field_parts(&mut self) -> Result<Vec<FieldPart>, StoreError> {
+        let parts = self.rows(RowKind::PreviousFieldPart)?;
+        self.checked_parts(parts)
+    }
+
+    /// Refuses rows whose field is missing or has other components.
+    fn checked_parts(&mut self, parts: Vec<FieldPart>) -> Result<Vec<FieldPart>, StoreError> {
+        let fields = self.fields()?;
+        let fits = |part: &&FieldPart| {
+            let field = fields.iter().find(|field| field.id == part.field);
+            field.is_none_or(|field| field.components as usize != part.ranges.len())
+        };
+        match parts.iter().find(fits) {
+            Some(part) => {
+                let key = RowKind::FieldPart.key(part.field, part.rank);
+                Err(self.damaged_row(key, "gives the values of no field"))
+            }
+            None => Ok(parts),
+        }
+    }
+
+    /// Path of the file of a field's values.
+    pub fn field_path(&self, file: FileRow) -> DiskPath {
+        self.disk_path().join(file.field_name())
+    }
+
+    /// Opens the values of a field in the sub-domain `mesh` with `cache_bytes` for redb.
+    ///
+    /// Errors: damage; [`StoreError::Changed`].
+    pub fn open_field(
+        &mut self,
+        field: &FieldRow,
+        mesh: &Subdomain,
+        cache_bytes: usize,
+    ) -> Result<FieldFile, StoreError> {
+        let rank = mesh.id().rank();
+        let parts = self.field_parts()?;
+        let Some(part) = parts.into_iter().find(|p| (p.field, p.rank) == (field.id, rank)) else {
+            let what = format!("field {}: it has no values here", field.name);
+            return Err(mesh.damaged(what).into());
+        };
+        let row = (field.clone(), part.clone());
+        let opened = FieldFile::open(&self.field_path(part.file()), row, mesh, cache_bytes);
+        self.of_one_state(opened, |now| Ok(now.field_parts()?.contains(&part)))
+    }
+
+    /// Files of fields that count.
+    pub(super) fn field_files(&mut self) -> Result<Vec<FileRow>, StoreError> {
+        let mut parts: Vec<FieldPart> = self.rows(RowKind::FieldPart)?;
+        parts.extend(self.rows::<FieldPart>(RowKind::PreviousFieldPart)?);
+        Ok(parts.iter().map(FieldPart::file).collect())
+    }
+
+    /// The numbers of a new field, and of the first of its files.
+    pub fn next_field(&mut self) -> Result<(u32, u32), StoreError> {
+        let id = self.fields()?.iter().map(|field| field.id + 1).max().unwrap_or(1);
+        // The journal grows with each step, so that no number comes back soon.
+        let steps = self.journal()?.len() as u32;
+        let used = self.field_files()?.iter().map(|file| file.generation + 1).max();
+        Ok((id, used.unwrap_or(1).max(2 * steps)))
+    }
+
+    /// Number of values of a field at `place` in the whole store; a vertex counts in each of its sub-domains.
+    pub fn n_values(&mut self, place: FieldPlace) -> Result<u64, StoreError> {
+        let rows = self.subdomains()?.into_iter();
+        Ok(rows
+            .map(|row| match place {
+                FieldPlace::Vertices => row.vertices,
+                FieldPlace::Tets => row.tets,
+            })
+            .sum())
+    }
+}
+
+impl Step {
+    /// Sets the row of a field.
+    pub fn set_field(&mut self, row: &FieldRow) {
+        self.put(RowKind::Field.key(0, row.id), row);
+    }
+
+    /// Sets the values of a field in a sub-domain; their file is synced before the commit.
+    pub fn set_field_part(&mut self, part: &FieldPart) {
+        self.put(RowKind::FieldPart.key(part.field, part.rank), part);
+        self.field_listed.insert(part.file());
+        self.field_unlisted.remove(&part.file());
+    }
+
+    /// Keeps values that belong to the previous version of a sub-domain.
+    pub fn set_previous_field_part(&mut self, part: &FieldPart) {
+        self.put(RowKind::PreviousFieldPart.key(part.field, part.rank), part);
+        self.field_listed.insert(part.file());
+        self.field_unlisted.remove(&part.file());
+    }
+
+    /// Forgets values, those of the previous version of the sub-domain if `is_previous`; their file is removed after the commit.
+    pub fn remove_field_part(&mut self, part: &FieldPart, is_previous: bool) {
+        let kind = if is_previous { RowKind::PreviousFieldPart } else { RowKind::FieldPart };
+        self.changes.insert(kind.key(part.field, part.rank), None);
+        if self.field_listed.contains(&part.file()) {
+            return;
+        }
+        self.field_unlisted.insert(part.file());
+    }
+
+    /// Forgets a field with all its values.
+    pub fn remove_field(&mut self, row: &FieldRow, parts: [&[FieldPart]; 2]) {
+        self.changes.insert(RowKind::Field.key(0, row.id), None);
+        for (is_previous, parts) in [(false, parts[0]), (true, parts[1])] {
+            let own = parts.iter().filter(|part| part.field == row.id);
+            own.for_each(|part| self.remove_field_part(part, is_previous));
+        }
+    }
+}

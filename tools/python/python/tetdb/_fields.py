@@ -1,0 +1,130 @@
+"""Fields of a store: values at vertices or tetrahedra, as arrays."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator, MutableMapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._errors import TetdbError
+
+if TYPE_CHECKING:
+    from ._store import Store
+
+__all__ = ["Field", "Fields"]
+
+
+class Field:
+    """A field of a store, of :attr:`Store.fields`.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    at : str
+        `vertices` or `tets`.
+    dtype : numpy.dtype
+        Type of its numbers.
+    components : int
+        Numbers of a value: 1, 3, 6 or 9.
+    """
+
+    def __init__(self, store: Store, said: dict[str, Any]) -> None:
+        self._store = store
+        self.name = str(said["name"])
+        self.at = str(said["at"])
+        self.dtype = np.dtype(said["type"].replace("f32", "f4").replace("f64", "f8").replace("i32", "i4").replace("i64", "i8"))
+        self.components = int(said["components"])
+        self.ranges: list[dict[str, Any]] = said["ranges"]
+        self.bytes = int(said["bytes"])
+        self.digest = str(said["digest"])
+
+    def __repr__(self) -> str:
+        return f"<tetdb.Field {self.name!r}: {self.components} x {self.dtype} at {self.at}>"
+
+    def chunks(self, subdomain: int | None = None) -> Iterator[npt.NDArray[Any]]:
+        """The values of each chunk of vertices or tetrahedra, by sub-domain, in the order of the sub-domains' arrays."""
+        ranks = range(len(self._store.subdomains)) if subdomain is None else [subdomain]
+        for rank in ranks:
+            part = self._store._native.field(self.name, rank)
+            for chunk in range(part.n_chunks):
+                values = part.chunk(chunk)
+                yield values if self.components == 1 else values.reshape(-1, self.components)
+
+    def array(self, subdomain: int | None = None) -> npt.NDArray[Any]:
+        """All values; a vertex that several sub-domains share is in each of them."""
+        return np.concatenate(list(self.chunks(subdomain)))
+
+
+class Fields(MutableMapping[str, Any]):
+    """The fields of a store by name. `fields["T"] = array` adds one, `del fields["T"]` drops it."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def _said(self) -> list[dict[str, Any]]:
+        return list(json.loads(self._store._native.fields()))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter([field["name"] for field in self._said()])
+
+    def __len__(self) -> int:
+        return len(self._said())
+
+    def __getitem__(self, name: str) -> Field:
+        for said in self._said():
+            if said["name"] == name:
+                return Field(self._store, said)
+        raise KeyError(name)
+
+    def __setitem__(self, name: str, values: npt.ArrayLike) -> None:
+        self.add(name, values)
+
+    def __delitem__(self, name: str) -> None:
+        if name not in self:
+            raise KeyError(name)
+        self._store._native.drop_field(name)
+
+    def add(
+        self,
+        name: str,
+        values: npt.ArrayLike | str,
+        *,
+        at: str | None = None,
+        ids: npt.ArrayLike | None = None,
+    ) -> None:
+        """Adds a field.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+        values : array or str
+            A row for each value, of 1, 3, 6 or 9 numbers, in the order of an export or as `ids` say; or an expression such as
+            ``"300 + 20*x"``.
+        at : str, optional
+            `vertices` or `tets`; left out, an array with as many rows as there are tetrahedra is at these, any other at vertices.
+        ids : array of int, optional
+            Lasting ids of the vertices or tetrahedra, one for each row.
+        """
+        native = self._store._native
+        if isinstance(values, str):
+            native.add_field(name, at or "vertices", values, False, None)
+            return
+        array = np.ascontiguousarray(values)
+        place = at or ("tets" if len(array) == self._store.n_tets else "vertices")
+        if place not in ("vertices", "tets"):
+            raise TetdbError("bad-field", f"at={place!r}: expected 'vertices' or 'tets'", None, None)
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "values.npy")
+            np.save(file, array)
+            names = None
+            if ids is not None:
+                names = os.path.join(folder, "ids.npy")
+                np.save(names, np.ascontiguousarray(ids, dtype="<i8"))
+            native.add_field(name, place, file, True, names)
