@@ -7,7 +7,8 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArra
 use pyo3::prelude::*;
 use serde_json::json;
 use tetdb::{
-    CancelToken, CellArrays, DefectPlace, RepairKind, Seed, SeedKind, Settings, Word as _,
+    CancelToken, CellArrays, DefectPlace, RepairKind, Seed, SeedKind, Settings, SurfaceRemesh,
+    SurfaceWrap, Word as _,
 };
 
 use crate::failure::Failure;
@@ -187,6 +188,42 @@ impl Surface {
         let work = || Ok(tetdb::Surface::clone(&self.inner).repaired_by(kind, &settings)?);
         let (surface, steps) = watched(py, &token, None, work)?;
         Ok((Self { inner: Arc::new(surface) }, json!(steps).to_string()))
+    }
+
+    /// A wrap with this gap and offset, and what was done as JSON.
+    fn wrapped(
+        &self,
+        py: Python<'_>,
+        gap: LengthWords,
+        offset: LengthWords,
+    ) -> PyResult<(Self, String)> {
+        let how = SurfaceWrap { gap: length(gap), offset: length(offset) };
+        let token = CancelToken::new();
+        let settings = Settings::new().cancel(&token);
+        let work = || Ok(self.inner.wrapped_with(&how, &settings)?);
+        let (surface, report) = watched(py, &token, None, work)?;
+        Ok((Self { inner: Arc::new(surface) }, json!(report).to_string()))
+    }
+
+    /// The surface remeshed within `tolerance`, and what was done as JSON. `lengths` are the least and the greatest.
+    fn remeshed(
+        &self,
+        py: Python<'_>,
+        tolerance: LengthWords,
+        feature_angle: f64,
+        lengths: [Option<LengthWords>; 2],
+        hgrad: Option<f64>,
+    ) -> PyResult<(Self, String)> {
+        let mut how = SurfaceRemesh::default();
+        how.tolerance = length(tolerance);
+        how.feature_angle = feature_angle;
+        [how.hmin, how.hmax] = lengths.map(|l| l.map(length));
+        how.hgrad = hgrad;
+        let token = CancelToken::new();
+        let settings = Settings::new().cancel(&token);
+        let work = || Ok(self.inner.remeshed_with(&how, &settings)?);
+        let (surface, report) = watched(py, &token, None, work)?;
+        Ok((Self { inner: Arc::new(surface) }, json!(report).to_string()))
     }
 
     fn refined(&self, py: Python<'_>, hsiz: (f64, bool)) -> PyResult<Self> {

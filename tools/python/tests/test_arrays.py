@@ -230,6 +230,24 @@ def test_holes_are_closed_and_crossings_resolved(tmp_path: Path) -> None:
             bad()
 
 
+def test_surfaces_are_wrapped_and_remeshed(tmp_path: Path) -> None:
+    ball = tetdb.sample("sphere,radius=1,h=0.3")
+    open_ = tetdb.Surface(ball.points, ball.triangles[4:])
+    wrap = open_.wrapped(gap="20%", offset=0.05)
+    (step,) = wrap.repairs
+    assert wrap.check().ok and step["wrap"]["triangles"] == wrap.n_triangles
+    assert (np.linalg.norm(wrap.points, axis=1) > 0.9).all() and step["wrap"]["distance_to_input_max"] < 0.5
+    even = ball.remeshed("2%", hmax=0.5)
+    (step,) = even.repairs
+    assert even.check().ok and step["remesh"]["triangles"] == even.n_triangles
+    assert step["remesh"]["distance_bound"] <= 0.02 * 2 * 3**0.5 * 1.001
+    with tetdb.mesh(even, tmp_path / "even", hsiz="20%") as store:
+        assert store.verify().ok
+    for bad in (lambda: open_.remeshed(), lambda: ball.wrapped(gap=-1.0), lambda: ball.remeshed(tolerance="60%")):
+        with pytest.raises(tetdb.TetdbError):
+            bad()
+
+
 def test_a_store_shows_itself(parts: tetdb.Store, tmp_path: Path) -> None:
     assert "data:image/png;base64," in parts._repr_html_()
     parts.snapshot(tmp_path / "s.svg", color="quality", plane=((0.5, 0.5, 0.5), (1, 0, 0)), crinkle=True)

@@ -264,9 +264,64 @@ class Surface:
             raise TetdbError("bad-size", f"{weld!r} is no share of the box diagonal", "weld")
         return self._of(self._inner.repaired(weld))
 
+    def wrapped(self, gap: Length = "1%", offset: Length = "0.1%") -> Surface:
+        """A closed surface around all triangles, whatever these are: an alpha wrap. :attr:`repairs` of the result says what was done.
+
+        Parameters
+        ----------
+        gap : float or str
+            Openings narrower than about twice this are closed; triangles have about this size. In the surface's units, or a share of the
+            diagonal of its box.
+        offset : float or str
+            Greatest distance of the vertices from the surface.
+
+        Raises
+        ------
+        SurfaceError
+            Where the offset is below the rounding of the coordinates.
+        """
+        return self._reported("wrap", *self._inner.wrapped(length(gap, "gap"), length(offset, "offset")))
+
+    def remeshed(
+        self,
+        tolerance: Length = "0.05%",
+        *,
+        feature_angle: float = 40.0,
+        hmin: Length | None = None,
+        hmax: Length | None = None,
+        hgrad: float | None = None,
+    ) -> Surface:
+        """The surface with even triangles. :attr:`repairs` of the result says what was done.
+
+        Parameters
+        ----------
+        tolerance : float or str
+            No point of either surface is farther from the other: in the surface's units, or a share of the diagonal of its box.
+        feature_angle : float
+            Edges between triangles whose normals differ by more degrees are kept, and borders of labels.
+        hmin, hmax : float or str, optional
+            Least and greatest edge length asked for. Default: twice the tolerance, and none.
+        hgrad : float, optional
+            Greatest ratio of neighboring edge lengths. Default: 1.4.
+
+        Raises
+        ------
+        SurfaceError
+            Where the surface cannot be meshed as it is.
+        """
+        least = None if hmin is None else length(hmin, "hmin")
+        most = None if hmax is None else length(hmax, "hmax")
+        return self._reported("remesh", *self._inner.remeshed(length(tolerance, "tolerance"), feature_angle, (least, most), hgrad))
+
+    def _reported(self, step: str, native: _native.Surface, report: str) -> Surface:
+        surface = self._of(native)
+        surface._repairs = [*self._repairs, {step: json.loads(report)}]
+        return surface
+
     @property
     def repairs(self) -> list[dict[str, Any]]:
-        """What :meth:`repaired` did, step by step: each has one key, ``weld``, ``resolve`` or ``winding``, with counts, areas and volumes."""
+        """What :meth:`repaired`, :meth:`wrapped` and :meth:`remeshed` did, step by step: each has one key, ``weld``, ``resolve``,
+        ``winding``, ``wrap`` or ``remesh``, with counts, areas and distances."""
         return copy.deepcopy(list(self._repairs))
 
     def refined(self, hsiz: Length) -> Surface:
