@@ -16,11 +16,11 @@ from ._errors import (
     SurfaceError,
     TetdbError,
 )
+from ._fields import Fields, StoreField
 from ._mesh import Comparison, compare, mesh, open, resume, tetrahedralize
 from ._native import __version__
 from ._options import Event
 from ._sizes import Box, Cylinder, Field, Function, InRegion, NearLabel, Sphere
-from ._fields import Field, Fields
 from ._store import Chunk, Merged, Quality, Region, Store, Subdomain, SubdomainInfo, Verification
 from ._surface import CheckReport, Defects, Estimate, Surface, sample
 from ._tasks import begin, gather, plan, run_task
@@ -36,7 +36,6 @@ __all__ = [
     "Event",
     "Field",
     "Fields",
-    "Field",
     "Function",
     "InRegion",
     "NearLabel",
@@ -50,6 +49,7 @@ __all__ = [
     "Store",
     "StoreBusy",
     "StoreDamaged",
+    "StoreField",
     "Subdomain",
     "SubdomainInfo",
     "Surface",

@@ -16,10 +16,10 @@ from ._errors import TetdbError
 if TYPE_CHECKING:
     from ._store import Store
 
-__all__ = ["Field", "Fields"]
+__all__ = ["Fields", "StoreField"]
 
 
-class Field:
+class StoreField:
     """A field of a store, of :attr:`Store.fields`.
 
     Attributes
@@ -45,7 +45,7 @@ class Field:
         self.digest = str(said["digest"])
 
     def __repr__(self) -> str:
-        return f"<tetdb.Field {self.name!r}: {self.components} x {self.dtype} at {self.at}>"
+        return f"<tetdb.StoreField {self.name!r}: {self.components} x {self.dtype} at {self.at}>"
 
     def chunks(self, subdomain: int | None = None) -> Iterator[npt.NDArray[Any]]:
         """The values of each chunk of vertices or tetrahedra, by sub-domain, in the order of the sub-domains' arrays."""
@@ -76,10 +76,10 @@ class Fields(MutableMapping[str, Any]):
     def __len__(self) -> int:
         return len(self._said())
 
-    def __getitem__(self, name: str) -> Field:
+    def __getitem__(self, name: str) -> StoreField:
         for said in self._said():
             if said["name"] == name:
-                return Field(self._store, said)
+                return StoreField(self._store, said)
         raise KeyError(name)
 
     def __setitem__(self, name: str, values: npt.ArrayLike) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import meshio
+import meshio  # type: ignore[import-untyped]
 
 from ._store import Store
 
