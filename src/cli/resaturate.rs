@@ -44,7 +44,11 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
         }
         return Ok(0);
     }
-    let remeshed = remesh.run()?;
+    let remeshed = remesh.run().map_err(|e| match e.code() {
+        Code::BadField => Failure::from(e)
+            .help("--drop-fields drops them with the old mesh; add them again afterwards"),
+        _ => e.into(),
+    })?;
     if remeshed.subdomains.is_empty() {
         print_nothing(args, console);
         return Ok(0);

@@ -89,6 +89,11 @@ fn values_are_the_same_whatever_they_come_from() {
     // A changed mesh never keeps the values of the old one.
     let refused = place.run_line("resaturate a.tetdb --subdomain 1 --refine-by 0.8 --json");
     assert_eq!((refused.exit(), &refused.error()["code"]), (Some(3), &"bad-field".into()));
+    assert!(refused.error()["help"].as_str().expect("a help").contains("--drop-fields"));
+    // One that is refused drops nothing.
+    let line = "resaturate a.tetdb --subdomain 1 --refine-by 0.8 --drop-fields --memory 1MiB";
+    assert_ne!(place.run_line(line).exit(), Some(0));
+    assert_eq!(fields(&place).len(), 7);
     let line = "resaturate a.tetdb --subdomain 1 --refine-by 0.8 --drop-fields";
     place.run_line(line).succeeds();
     assert!(fields(&place).is_empty());

@@ -162,7 +162,7 @@ impl Store {
     pub fn drop_field(&mut self, name: &str) -> Result<(), Error> {
         self.change_fields(|catalog, _| {
             let field = field_called(catalog, name)?;
-            drop_all(catalog, &[field], "drop field")
+            drop_values(catalog, &field)
         })
     }
 
@@ -222,18 +222,14 @@ fn field_called(catalog: &mut Catalog, name: &str) -> Result<FieldRow, Error> {
     })
 }
 
-/// Drops fields with all their values, in one step.
-pub(super) fn drop_all(
-    catalog: &mut Catalog,
-    fields: &[FieldRow],
-    step_name: &str,
-) -> Result<(), Error> {
+/// Drops a field with all its values, in one step.
+fn drop_values(catalog: &mut Catalog, field: &FieldRow) -> Result<(), Error> {
     let clock = Instant::now();
     let (parts, previous) = (catalog.field_parts()?, catalog.previous_field_parts()?);
     let state = catalog.state()?;
     Ok(catalog.commit(|step| {
-        fields.iter().for_each(|field| step.remove_field(field, [&parts, &previous]));
-        step.append_journal(&journal(state, step_name, clock));
+        step.remove_field(field, [&parts, &previous]);
+        step.append_journal(&journal(state, "drop field", clock));
         Ok(())
     })?)
 }

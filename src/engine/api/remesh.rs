@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::preflight::scratch_beside;
 use super::remesh_sizes::{Lengths, RemeshSizes};
 use super::store::{open_finished, open_to_change};
-use super::{Error, Settings, Sizes, Store, Surface, field_spec, fields, guarded, job, verify};
+use super::{Error, Settings, Sizes, Store, Surface, field_spec, guarded, job, verify};
 use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Values};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_store::audit::Level;
@@ -94,7 +94,7 @@ impl Store {
         let summary = guarded(&settings, || {
             let mut catalog = open_to_change(&path, &settings)?;
             let lock = catalog.lock();
-            settle_fields(&mut catalog, false)?;
+            refuse_fields(&mut catalog)?;
             let summary = pipeline::undo(&mut catalog)?;
             catalog.close()?;
             if let (true, Some(lock)) = (verify, lock) {
@@ -182,7 +182,7 @@ impl Remesh {
         self
     }
 
-    /// Drops all fields of the store first. Otherwise a store with fields is refused: their values belong to the mesh as it is.
+    /// Drops all fields of the store together with the old mesh. Otherwise a store with fields is refused: their values belong to the mesh as it is.
     pub fn drop_fields(mut self) -> Self {
         self.drop_fields = true;
         self
@@ -242,7 +242,9 @@ impl Remesh {
             return Ok(None);
         }
         check_recipe(&mut open, self.repair, &self.settings)?;
-        settle_fields(&mut open, self.drop_fields)?;
+        if !self.drop_fields {
+            refuse_fields(&mut open)?;
+        }
         let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
         let summary = pipeline::resaturate(&mut open, &options, &request, &budget, &watch)?;
         open.close()?;
@@ -282,14 +284,11 @@ impl Remeshed {
     }
 }
 
-/// Drops the fields of a store whose mesh is about to change, or refuses it.
-fn settle_fields(open: &mut Catalog, drop: bool) -> Result<(), Error> {
+/// Refuses a store with fields: their values would be lost.
+fn refuse_fields(open: &mut Catalog) -> Result<(), Error> {
     let fields = open.fields()?;
     if fields.is_empty() {
         return Ok(());
-    }
-    if drop {
-        return fields::drop_all(open, &fields, "drop fields");
     }
     let names: Vec<&str> = fields.iter().map(|field| &*field.name).collect();
     let message = format!(

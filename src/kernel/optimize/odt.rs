@@ -26,9 +26,6 @@ const MOVE_MAX: f64 = 0.3;
 /// A vertex may halve its move 1 / STEP_BACK − 1 times before it goes back altogether: without that, 6 % stay where they were, with one halving 2 %.
 const STEP_BACK: f64 = 0.5;
 
-/// Vertices that move less are at rest, in units of h.
-const REST: f64 = 0.02;
-
 /// Pages whose sums are one term of a vertex's sum: the positions depend on it.
 const GROUP_PAGES: usize = 8;
 /// Groups summed before they are added up.
@@ -39,8 +36,6 @@ const BATCH_GROUPS: usize = 8;
 pub(super) struct Moves {
     pub(super) moved: u64,
     pub(super) held: u64,
-    /// Vertices that were not at rest.
-    pub(super) restless: u64,
 }
 
 /// Moves every free vertex once. Effects: the scratch pages are used and forgotten; no connection changes.
@@ -147,7 +142,6 @@ fn displace<P: Pages>(mesh: &mut Mesh<P>, way: Way) -> Moves {
             }
             mesh.set_point(v, at + shift);
             moves.moved += 1;
-            moves.restless += u64::from(length > REST * h);
         }
     }
     moves

@@ -27,12 +27,6 @@ impl Word for Mode {
         &[(Self::None, "none"), (Self::Delaunay, "delaunay"), (Self::Full, "full")];
 }
 
-/// Sweeps of smoothing end when no greater share of the vertices moves by more than a fiftieth of a length. A box is at rest after three,
-/// balls after five; at one half balls go on to six and gain 0.05 % of faces that are locally Delaunay.
-const RESTLESS: f64 = 0.6;
-/// The first sweep moves few vertices of a pattern, and those at the limits of its grains not far enough.
-const SWEEPS_MIN: u32 = 2;
-
 /// Choices of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
@@ -112,13 +106,8 @@ pub fn run_with<P: Pages>(
         let moves = odt::sweep(mesh, way);
         report.odt_moves += moves.moved;
         report.odt_held += moves.held;
-        let at_rest = sweep + 1 >= SWEEPS_MIN
-            && moves.restless as f64 <= RESTLESS * (moves.moved + moves.held) as f64;
         tell("delaunay", sweep + 1, settings.odt_sweeps + 1);
         lawson.sweep(mesh, way);
-        if at_rest {
-            break;
-        }
     }
     report.flips = lawson.stats;
     if settings.mode == Mode::Full {
