@@ -56,13 +56,11 @@ pub enum RowKind {
     Field = 81,
     /// [`FieldPart`](crate::field::FieldPart) (number of the field, rank).
     FieldPart = 82,
-    /// [`FieldPart`](crate::field::FieldPart) before the last change of the sub-domain (number of the field, rank).
-    PreviousFieldPart = 83,
 }
 
 impl RowKind {
     /// All kinds, by number.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 19] = [
         Self::Format,
         Self::State,
         Self::Job,
@@ -82,7 +80,6 @@ impl RowKind {
         Self::LabelSets,
         Self::Field,
         Self::FieldPart,
-        Self::PreviousFieldPart,
     ];
 
     /// The kind of a key; `None` for a key of no row.

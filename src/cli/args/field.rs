@@ -1,4 +1,4 @@
-//! What can be typed behind `field`.
+//! Arguments of `tetdb field`.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! What a new field is: its name, place, type and components.
+//! The description of a new field: name, place, type and components.
 
 use super::{Code, Error, VARIABLES};
 use tetdb_schema::field::{COMPONENTS, FieldNumber, FieldPlace, FieldRow, Scalar};

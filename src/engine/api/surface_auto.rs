@@ -14,7 +14,7 @@ use super::{
 };
 use tetdb_base::geom::{counted, short};
 use tetdb_base::storage::{ScratchSpace, attempt};
-use tetdb_base::surface::{closing, validate_with};
+use tetdb_base::surface::{self, closing, validate_with};
 use tetdb_repair::close::{CloseError, Watcher, close_bytes};
 use tetdb_schema::source::Source;
 
@@ -210,6 +210,15 @@ impl Surface {
             self.sources = self.copied(&self.inner);
         }
         self.sources.push(Source { origin, ..given(&self.inner) });
+    }
+
+    /// Another surface in place of this one, with what made it on record.
+    pub(super) fn replaced_by(&self, inner: surface::Surface, origin: Origin) -> Self {
+        let sources = self.sources.clone();
+        let mut surface =
+            Self { inner, sources, turned: 0, divides: self.divides, snaps: self.snaps };
+        surface.record(origin);
+        surface
     }
 
     /// Repeats a repair on record.

@@ -175,10 +175,7 @@ impl Surface {
             let places = OptionsText::from_sizes(places, None);
             text += &format!(",places={}", serde_json::json!(places));
         }
-        let mut even = Self { inner, ..self.clone() };
-        even.turned = 0;
-        even.record(Origin::Remeshed(text));
-        Ok((even, report))
+        Ok((self.replaced_by(inner, Origin::Remeshed(text)), report))
     }
 
     /// Remeshes again as the record says; the copy in a store is remeshed already.

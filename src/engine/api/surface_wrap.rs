@@ -4,9 +4,8 @@ use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface;
 use tetdb_repair::wrap::{WrapError, WrapReport, WrapSettings, wrap};
 use tetdb_schema::code::Code;
-use tetdb_schema::source::{Origin, Source};
+use tetdb_schema::source::Origin;
 
-use super::surface::given;
 use super::{Error, Length, Settings, Surface, guarded};
 
 /// Steps of progress.
@@ -81,13 +80,8 @@ impl Surface {
     ) -> Result<(Self, WrapReport), Error> {
         let (mut inner, report) = attempt(|| wrap(&self.inner, wanted, scratch, progress))??;
         inner.notes.clone_from(&self.inner.notes);
-        let own = given(&inner);
-        let is_file = self.sources.iter().all(|s| s.origin != Origin::Copy);
-        let mut sources = if is_file { self.sources.clone() } else { vec![own.clone()] };
         let text = format!("gap={:e},offset={:e}", wanted.gap, wanted.offset);
-        sources.push(Source { origin: Origin::Wrapped(text), ..own });
-        let surface = Self { inner, sources, turned: 0, divides: self.divides, snaps: self.snaps };
-        Ok((surface, report))
+        Ok((self.replaced_by(inner, Origin::Wrapped(text)), report))
     }
 
     /// Wraps again as the record says; the copy in a store is wrapped already.
@@ -97,8 +91,7 @@ impl Surface {
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
         if self.sources.iter().any(|s| s.origin == Origin::Copy) {
-            let source = Source { origin: Origin::Wrapped(text.to_owned()), ..given(&self.inner) };
-            self.sources.push(source);
+            self.record(Origin::Wrapped(text.to_owned()));
             return Ok(self);
         }
         let number = |key: &str| {

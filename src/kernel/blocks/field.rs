@@ -1,10 +1,10 @@
-//! What saturation is asked for: wanted lengths, and where points may go.
+//! The wanted lengths of a saturation, and where points may go.
 
 use super::placement::PlacementRule;
 use crate::mesh::End;
 use tetdb_base::geom::{Aabb, Point};
 
-/// What is wanted where, and where points may go.
+/// Wanted lengths, and where points may go.
 pub struct Field<'a> {
     /// Wanted edge length at a position.
     pub h: &'a (dyn Fn(Point) -> f64 + Sync),

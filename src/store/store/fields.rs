@@ -21,26 +21,15 @@ impl Catalog {
         }
     }
 
-    /// The values of all fields, by field and rank.
+    /// The values of all fields, by field and rank. Errors: damage, such as a row whose field is missing or has other components.
     pub fn field_parts(&mut self) -> Result<Vec<FieldPart>, StoreError> {
-        let parts = self.rows(RowKind::FieldPart)?;
-        self.checked_parts(parts)
-    }
-
-    /// Values that belong to the previous versions of sub-domains.
-    pub fn previous_field_parts(&mut self) -> Result<Vec<FieldPart>, StoreError> {
-        let parts = self.rows(RowKind::PreviousFieldPart)?;
-        self.checked_parts(parts)
-    }
-
-    /// Refuses rows whose field is missing or has other components.
-    fn checked_parts(&mut self, parts: Vec<FieldPart>) -> Result<Vec<FieldPart>, StoreError> {
+        let parts: Vec<FieldPart> = self.rows(RowKind::FieldPart)?;
         let fields = self.fields()?;
-        let fits = |part: &&FieldPart| {
+        let is_lost = |part: &&FieldPart| {
             let field = fields.iter().find(|field| field.id == part.field);
             field.is_none_or(|field| field.components as usize != part.ranges.len())
         };
-        match parts.iter().find(fits) {
+        match parts.iter().find(is_lost) {
             Some(part) => {
                 let key = RowKind::FieldPart.key(part.field, part.rank);
                 Err(self.damaged_row(key, "gives the values of no field"))
@@ -76,8 +65,7 @@ impl Catalog {
 
     /// Files of fields that count.
     pub(super) fn field_files(&mut self) -> Result<Vec<FileRow>, StoreError> {
-        let mut parts: Vec<FieldPart> = self.rows(RowKind::FieldPart)?;
-        parts.extend(self.rows::<FieldPart>(RowKind::PreviousFieldPart)?);
+        let parts: Vec<FieldPart> = self.rows(RowKind::FieldPart)?;
         Ok(parts.iter().map(FieldPart::file).collect())
     }
 
@@ -115,29 +103,12 @@ impl Step {
         self.field_unlisted.remove(&part.file());
     }
 
-    /// Keeps values that belong to the previous version of a sub-domain.
-    pub fn set_previous_field_part(&mut self, part: &FieldPart) {
-        self.put(RowKind::PreviousFieldPart.key(part.field, part.rank), part);
-        self.field_listed.insert(part.file());
-        self.field_unlisted.remove(&part.file());
-    }
-
-    /// Forgets values, those of the previous version of the sub-domain if `is_previous`; their file is removed after the commit.
-    pub fn remove_field_part(&mut self, part: &FieldPart, is_previous: bool) {
-        let kind = if is_previous { RowKind::PreviousFieldPart } else { RowKind::FieldPart };
-        self.changes.insert(kind.key(part.field, part.rank), None);
-        if self.field_listed.contains(&part.file()) {
-            return;
-        }
-        self.field_unlisted.insert(part.file());
-    }
-
-    /// Forgets a field with all its values.
-    pub fn remove_field(&mut self, row: &FieldRow, parts: [&[FieldPart]; 2]) {
+    /// Forgets a field with its values among `parts`; their files are removed after the commit.
+    pub fn remove_field(&mut self, row: &FieldRow, parts: &[FieldPart]) {
         self.changes.insert(RowKind::Field.key(0, row.id), None);
-        for (is_previous, parts) in [(false, parts[0]), (true, parts[1])] {
-            let own = parts.iter().filter(|part| part.field == row.id);
-            own.for_each(|part| self.remove_field_part(part, is_previous));
+        for part in parts.iter().filter(|part| part.field == row.id) {
+            self.changes.insert(RowKind::FieldPart.key(part.field, part.rank), None);
+            self.field_unlisted.insert(part.file());
         }
     }
 }

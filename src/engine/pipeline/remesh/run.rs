@@ -307,8 +307,7 @@ impl<'a> RemeshRun<'a> {
         }
         let regions = sum_totals(self.catalog, self.n, &totals)?.regions;
         let dropped = Previous::of(self.catalog)?;
-        let fields = self.catalog.fields()?;
-        let values = [self.catalog.field_parts()?, self.catalog.previous_field_parts()?];
+        let (fields, values) = (self.catalog.fields()?, self.catalog.field_parts()?);
         let (what, rows, clock) = (self.what, &self.rows, self.clock);
         let requested = what.sizes.as_ref().map(|sizes| sizes.requested.as_bytes());
         let step_name = match what.repair {
@@ -351,10 +350,8 @@ impl<'a> RemeshRun<'a> {
                 journal.subdomain = Some(rank);
                 step.append_journal(&journal);
             }
-            // Their values belong to the mesh as it was; whoever asks for the change has agreed to lose them.
-            fields
-                .iter()
-                .for_each(|field| step.remove_field(field, values.each_ref().map(|v| &v[..])));
+            // Their values are of the old mesh. A caller that keeps them refuses the change before.
+            fields.iter().for_each(|field| step.remove_field(field, &values));
             step.set_regions(&regions);
             step.set_state(StoreState::Sealed);
             Ok(())
