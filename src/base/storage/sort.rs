@@ -88,6 +88,24 @@ impl<R: SortRecord> Sorter<R> {
         Ok(())
     }
 
+    /// Adds records that are bytes already. Errors: the disk, when a run is written.
+    pub fn extend(&mut self, mut records: &[R::Bytes]) -> Result<(), StorageError> {
+        while !records.is_empty() {
+            if self.records.len() == self.records_max {
+                self.spill()?;
+            }
+            let room = self.records_max - self.records.len();
+            let (now, later) = records.split_at(records.len().min(room));
+            if self.records.len() + now.len() > self.records.capacity() {
+                let more = (self.records.len() / 2).min(room).max(now.len());
+                reserve(&mut self.records, more);
+            }
+            self.records.extend_from_slice(now);
+            records = later;
+        }
+        Ok(())
+    }
+
     fn spill(&mut self) -> Result<(), StorageError> {
         check_cancelled();
         sort_unstable_by(&mut self.records, order);
@@ -279,9 +297,11 @@ mod tests {
         expected.sort_unstable();
         for memory in [1 << 16, 1 << 18, 1 << 24] {
             let mut sorter = Sorter::new(dir.path(), memory);
-            for &record in &records {
+            let (one_by_one, at_once) = records.split_at(70_000);
+            for &record in one_by_one {
                 sorter.push(record)?;
             }
+            sorter.extend(at_once)?;
             let files: Vec<_> = sorter.runs.iter().map(|run| Arc::as_ptr(&run.file)).collect();
             assert!(files.windows(2).all(|pair| pair[0] == pair[1]), "one file");
             let sorted: Result<Vec<_>, _> = sorter.finish()?.collect();

@@ -32,10 +32,10 @@ pub struct TetPiece {
 }
 
 /// Sums are kept in so many lanes at once. The result depends on it in its last bits, so it is a constant.
-const LANES: usize = 2;
+const LANES: usize = 16;
 /// Consecutive tetrahedra that go to the same lane, and how many such blocks are read before the lanes are worked on.
 const BLOCK: usize = 64;
-const BLOCKS: usize = 32;
+const BLOCKS: usize = 256;
 
 /// A wanted length at each point, called from several threads.
 pub type SizeFn<'a> = dyn Fn(Point) -> f64 + Sync + 'a;

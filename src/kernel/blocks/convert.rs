@@ -1,14 +1,16 @@
 //! Bricks from the pages of a coarse mesh, and pages from bricks.
 
+use std::sync::Arc;
+
 use tetdb_schema::page::NONE;
 
-use super::brick::{Bricks, SLOT_BITS, SLOT_MASK, Slot};
+use super::brick::{Brick, Bricks, SLOT_BITS, SLOT_MASK, Slot};
 use super::field::Field;
 use super::flat::Vertex;
 use super::partition::KdPartition;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
-use crate::mesh::{FaceRef, Mesh, Tet, dense, sparse};
+use crate::mesh::{FaceRef, Mesh, Scan, Tet, dense, scan_parts, sparse};
 use tetdb_base::geom::mix;
 use tetdb_base::storage::{Pages, StorageError, raise};
 
@@ -164,20 +166,55 @@ pub(super) fn to_pages<P: Pages>(bricks: &Bricks, n_bricks: u32, mesh: &mut Mesh
     }
     mesh.take_tets(n_tets);
     let mut unused = Vec::new();
-    for number in 0..n_bricks {
-        let brick = bricks.take(number);
-        let first = numbers[number as usize].tet;
-        for (k, (tet, &attribute)) in (first..).zip(brick.tets.iter().zip(&brick.attributes)) {
-            let mut out = *tet;
-            if !tet.is_live() {
-                mesh.place_tet(sparse(k), out);
-                unused.push(sparse(k));
-                continue;
+    let (mut k, mut first) = (0, 0);
+    while first < n_bricks {
+        let batch: Vec<_> =
+            (first..n_bricks).take(BATCH).map(|number| bricks.take(number)).collect();
+        first += batch.len() as u32;
+        let parts: Vec<u32> = (0..batch.len() as u32).collect();
+        let tets = scan_parts(mesh, &parts, &Renumbered { batch: &batch, numbers: &numbers });
+        for (brick, (tets, n)) in batch.iter().zip(tets) {
+            over_constrained += n;
+            for (tet, &attribute) in tets.into_iter().zip(&brick.attributes) {
+                let t = sparse(k);
+                k += 1;
+                mesh.place_tet(t, tet);
+                if !tet.is_live() {
+                    unused.push(t);
+                } else if attribute != (0, 0) {
+                    mesh.set_tet_attribute(t, attribute.0, attribute.1);
+                }
             }
-            over_constrained += u64::from((0..4).filter(|&i| tet.is_required(i)).count() > 1);
+        }
+    }
+    unused.into_iter().rev().for_each(|t| mesh.free_tet(t));
+    gone.into_iter().rev().for_each(|v| mesh.free_vertex(v));
+    mesh.clear_scratch();
+    over_constrained
+}
+
+/// Bricks renumbered at once: some megabytes.
+const BATCH: usize = 128;
+
+/// Scan that returns the tetrahedra of a brick under their ids, and how many have several required faces.
+struct Renumbered<'a> {
+    batch: &'a [Arc<Brick>],
+    numbers: &'a [Numbers],
+}
+
+impl Scan for Renumbered<'_> {
+    type Part = u32;
+    type Output = (Vec<Tet>, u64);
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &part: &u32) -> Self::Output {
+        let brick = &self.batch[part as usize];
+        let mut over_constrained = 0;
+        let mut tets = brick.tets.clone();
+        for out in tets.iter_mut().filter(|tet| tet.is_live()) {
+            over_constrained += u64::from((0..4).filter(|&i| out.is_required(i)).count() > 1);
             for node in &mut out.node {
                 let at = brick.resolve(*node & VERTEX_MASK);
-                let there = &numbers[at.brick as usize];
+                let there = &self.numbers[at.brick as usize];
                 let v = match at.slot.checked_sub(there.n_coarse) {
                     Some(new) => sparse(there.vertex + new),
                     None => mesh.scratch(there.coarse + at.slot),
@@ -186,18 +223,11 @@ pub(super) fn to_pages<P: Pages>(bricks: &Bricks, n_bricks: u32, mesh: &mut Mesh
             }
             for face in &mut out.neighbor {
                 if let Some(at) = brick.across(*face) {
-                    let t = sparse(numbers[at.brick as usize].tet + at.slot);
+                    let t = sparse(self.numbers[at.brick as usize].tet + at.slot);
                     *face = FaceRef::new(t, face.face());
                 }
             }
-            mesh.place_tet(sparse(k), out);
-            if attribute != (0, 0) {
-                mesh.set_tet_attribute(sparse(k), attribute.0, attribute.1);
-            }
         }
+        (tets, over_constrained)
     }
-    unused.into_iter().rev().for_each(|t| mesh.free_tet(t));
-    gone.into_iter().rev().for_each(|v| mesh.free_vertex(v));
-    mesh.clear_scratch();
-    over_constrained
 }

@@ -7,9 +7,9 @@ use super::field::Field;
 use crate::delaunay::Kernel;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGES, FACES, FROZEN, MARK};
-use crate::mesh::{Mesh, dense, sparse};
+use crate::mesh::{Mesh, Scan, Tet, scan_parts, tets_of_page};
 use tetdb_base::geom::{HilbertFrame, Point, mix, orient};
-use tetdb_base::storage::{Pages, check_cancelled};
+use tetdb_base::storage::{Pages, check_cancelled, kind};
 
 use super::spawn::center;
 
@@ -21,6 +21,8 @@ const LONG: f64 = 2.0;
 const FILTER: f64 = 0.75;
 /// Rounds at most: each halves what is long.
 const ROUNDS_MAX: u32 = 30;
+/// Pages of tetrahedra asked before marks are set.
+const BATCH: usize = 256;
 /// Levels of random order in the first round: its points come from cavities that would grow without.
 const LEVELS: u64 = 7;
 
@@ -32,23 +34,17 @@ pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
     let mut inserted = 0;
     for round in 0..ROUNDS_MAX {
         check_cancelled();
-        let mut found = Vec::new();
-        for t in (0..dense(mesh.tet_ids_end())).map(sparse) {
-            let tet = mesh.tet(t);
-            if !tet.is_live() || tet.node[EXAMINED] & MARK != 0 {
-                continue;
+        let found = wanted(mesh, field);
+        let key = |(t, point, h)| {
+            let mut key = order.index(point);
+            if round == 0 {
+                let random = mix(key ^ 77);
+                let level = (0..LEVELS).find(|l| random >> (3 * l) & 7 == 0).unwrap_or(LEVELS);
+                key = level << 61 | key >> 3;
             }
-            mesh.set_mark(t, EXAMINED, true);
-            if let Some((point, h)) = wanted(mesh, t, field) {
-                let mut key = order.index(point);
-                if round == 0 {
-                    let random = mix(key ^ 77);
-                    let level = (0..LEVELS).find(|l| random >> (3 * l) & 7 == 0).unwrap_or(LEVELS);
-                    key = level << 61 | key >> 3;
-                }
-                found.push((key, t, point, h));
-            }
-        }
+            (key, t, point, h)
+        };
+        let mut found: Vec<(u64, u32, Point, f64)> = found.into_iter().map(key).collect();
         found.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.cmp(&b.1)));
         let before = inserted;
         for (_, t, point, h) in found {
@@ -91,11 +87,45 @@ pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
     inserted
 }
 
+/// A tetrahedron, its point, and the length wanted there.
+type Wanted = (u32, Point, f64);
+
+/// The points that tetrahedra want which were not asked before.
+fn wanted<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<Wanted> {
+    let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
+    let mut found = Vec::new();
+    for batch in pages.chunks(BATCH) {
+        for (due, points) in scan_parts(mesh, batch, &Long(field)) {
+            due.into_iter().for_each(|t| mesh.set_mark(t, EXAMINED, true));
+            found.extend(points);
+        }
+    }
+    found
+}
+
+/// Scan that returns which tetrahedra of a page were not asked before, and what they want.
+struct Long<'a, 'b>(&'a Field<'b>);
+
+impl Scan for Long<'_, '_> {
+    type Part = u32;
+    type Output = (Vec<u32>, Vec<Wanted>);
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Self::Output {
+        let (mut due, mut points) = (Vec::new(), Vec::new());
+        tets_of_page(mesh, page, |mesh, t, tet| {
+            if tet.node[EXAMINED] & MARK == 0 {
+                due.push(t);
+                points.extend(point_of(mesh, &tet, self.0).map(|(point, h)| (t, point, h)));
+            }
+        });
+        (due, points)
+    }
+}
+
 /// The point that a long tetrahedron gets, and the length wanted there.
-fn wanted<P: Pages>(mesh: &mut Mesh<P>, t: u32, field: &Field) -> Option<(Point, f64)> {
-    let tet = mesh.tet(t);
-    let ends = mesh.ends(&tet);
-    let p = mesh.points(&tet);
+fn point_of<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, field: &Field) -> Option<(Point, f64)> {
+    let ends = mesh.ends(tet);
+    let p = mesh.points(tet);
     let longest = EDGES.iter().map(|&[i, j]| (p[i] - p[j]).length_squared()).fold(0.0, f64::max);
     let least = ends.iter().map(|e| f64::from(e.h)).fold(f64::INFINITY, f64::min);
     let is_long = |h: f64| longest > (LONG * COARSER * h) * (LONG * COARSER * h);

@@ -9,6 +9,7 @@ use tetdb_schema::record::{CoarseFace, CoarseTet, CoarseVertex, WorkingFacet};
 
 use super::SealedError;
 use super::batch::Batch;
+use super::form::packer;
 use super::form::Loader;
 use super::subdomain::Chunks;
 use tetdb_base::storage::{DiskPath, StoreFile};
@@ -46,10 +47,10 @@ impl CoarseWriter {
             batch: Batch::new(memory_bytes),
             rank,
             generation,
-            vertices: Packer::new(rank, generation).map_err(io)?,
-            tets: Packer::new(rank, generation).map_err(io)?,
-            facets: Packer::new(rank, generation).map_err(io)?,
-            faces: Packer::new(rank, generation).map_err(io)?,
+            vertices: packer(rank, generation).map_err(io)?,
+            tets: packer(rank, generation).map_err(io)?,
+            facets: packer(rank, generation).map_err(io)?,
+            faces: packer(rank, generation).map_err(io)?,
         })
     }
 
@@ -108,10 +109,10 @@ fn push<R: ChunkRecord>(
     record: R,
 ) -> Result<(), SealedError> {
     let packed = packer.push(record);
-    match packed.map_err(|e| SealedError::io(file.path(), e))? {
-        Some(chunk) => batch.push(file, chunk.address.key(), chunk.value),
-        None => Ok(()),
+    for chunk in packed.map_err(|e| SealedError::io(file.path(), e))? {
+        batch.push(file, chunk.address.key(), chunk.value)?;
     }
+    Ok(())
 }
 
 fn end<R: ChunkRecord>(

@@ -110,7 +110,7 @@ impl FieldWriter {
             while let Some(cut) =
                 self.packer.cut().map_err(|e| SealedError::io(self.path.path(), e))?
             {
-                self.put(Some(cut))?;
+                self.put([cut])?;
             }
             let pieces = self.packer.chunks() - piece;
             let FieldRange { low, high, nan } = range;
@@ -125,11 +125,11 @@ impl FieldWriter {
         Ok(())
     }
 
-    fn put<R>(&mut self, cut: Option<PackedChunk<R>>) -> Result<(), SealedError> {
-        match cut {
-            Some(cut) => self.batch.push(&mut self.file, cut.address.key(), cut.value),
-            None => Ok(()),
+    fn put<R>(&mut self, cut: impl IntoIterator<Item = PackedChunk<R>>) -> Result<(), SealedError> {
+        for chunk in cut {
+            self.batch.push(&mut self.file, chunk.address.key(), chunk.value)?;
         }
+        Ok(())
     }
 
     fn put_summaries<R: ChunkRecord>(&mut self, summaries: &[R]) -> Result<u32, SealedError> {
@@ -141,7 +141,7 @@ impl FieldWriter {
             self.put(cut)?;
         }
         while let Some(cut) = packer.cut().map_err(io)? {
-            self.put(Some(cut))?;
+            self.put([cut])?;
         }
         Ok(packer.chunks())
     }

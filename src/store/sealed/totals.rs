@@ -34,9 +34,27 @@ pub struct SubdomainTotals {
     pub volume: f64,
     /// Sums of the regions by number.
     pub regions: BTreeMap<u32, RegionTotals>,
-    /// Vertices of the current piece; kept, because the system clears newly allocated memory.
+    scratch: SumScratch,
+}
+
+/// Vertices and shapes of the current piece; kept, because the system clears newly allocated memory.
+#[derive(Default)]
+pub(super) struct SumScratch {
     corners: Vec<[VertexSum; 4]>,
     shapes: Vec<Shape>,
+}
+
+/// Sums over a chunk of tetrahedra.
+pub(super) struct ChunkSums {
+    /// Without the number of open faces and the bytes.
+    pub summary: TetSummary,
+    digest: Digest,
+    bins: [u64; QUALITY_BINS],
+    worst: f64,
+    worst_tet: u32,
+    cosines: [f64; 2],
+    /// Of each tetrahedron.
+    volumes: Vec<f64>,
 }
 
 /// The parts of a vertex that are summed.
@@ -121,8 +139,7 @@ impl Default for SubdomainTotals {
             cosines: [1.0, -1.0],
             volume: 0.0,
             regions: BTreeMap::new(),
-            corners: Vec::with_capacity(PIECE),
-            shapes: Vec::with_capacity(PIECE),
+            scratch: SumScratch::default(),
         }
     }
 }
@@ -136,23 +153,84 @@ impl SubdomainTotals {
         first: u32,
         tets: &[SealedTet],
         rank: u32,
-        mut corners_of: impl FnMut(&SealedTet) -> Result<[Corner; 4], E>,
+        corners_of: impl FnMut(&SealedTet) -> Result<[Corner; 4], E>,
     ) -> Result<TetSummary, E> {
+        let mut scratch = std::mem::take(&mut self.scratch);
+        let sums = ChunkSums::of((first, tets), rank, self.cosines, &mut scratch, corners_of);
+        self.scratch = scratch;
+        let sums = sums?;
+        self.add_sums(tets, &sums);
+        Ok(sums.summary)
+    }
+
+    /// Adds the sums of the next chunk.
+    pub(super) fn add_sums(&mut self, tets: &[SealedTet], sums: &ChunkSums) {
+        self.digest.merge(&sums.digest);
+        self.bins.iter_mut().zip(sums.bins).for_each(|(all, n)| *all += n);
+        if sums.worst > self.worst {
+            (self.worst, self.worst_tet) = (sums.worst, sums.worst_tet);
+        }
+        let [least, most] = self.cosines;
+        self.cosines = [least.min(sums.cosines[0]), most.max(sums.cosines[1])];
+        // Volumes one after another: a sum does not depend on chunks.
+        let mut run = RegionRun::begin(tets[0].region, &self.regions);
+        for (tet, &volume) in tets.iter().zip(&sums.volumes) {
+            self.volume += volume;
+            if run.region != tet.region {
+                run.end(&mut self.regions);
+                run = RegionRun::begin(tet.region, &self.regions);
+            }
+            run.totals.tets += 1;
+            run.totals.volume += volume;
+        }
+        run.end(&mut self.regions);
+    }
+
+    /// The table of qualities.
+    pub fn quality(&self) -> QualityRow {
+        let angle = |cosine: f64| cosine.clamp(-1.0, 1.0).acos();
+        QualityRow {
+            bins: self.bins,
+            worst: self.worst,
+            worst_tet: self.worst_tet,
+            dihedral: [angle(self.cosines[1]), angle(self.cosines[0])],
+        }
+    }
+}
+
+impl ChunkSums {
+    /// Sums over the tetrahedra of a chunk, the first of which has number `first`. Cosines between those `known` are left out.
+    ///
+    /// Errors: those of `corners_of`.
+    pub fn of<E>(
+        (first, tets): (u32, &[SealedTet]),
+        rank: u32,
+        known: [f64; 2],
+        scratch: &mut SumScratch,
+        mut corners_of: impl FnMut(&SealedTet) -> Result<[Corner; 4], E>,
+    ) -> Result<Self, E> {
         let mut bounds = Aabb::EMPTY;
-        let mut summary = TetSummary {
-            bounds: [[0.0; 3]; 2],
-            volume: 0.0,
-            quality: [0.0; 2],
-            regions: [u32::MAX, 0],
-            vertices: [u32::MAX, 0],
-            first,
-            count: tets.len() as u32,
-            open_faces: 0,
-            bytes: 0,
-            edge_max: 0.0,
+        let mut sums = Self {
+            summary: TetSummary {
+                bounds: [[0.0; 3]; 2],
+                volume: 0.0,
+                quality: [0.0; 2],
+                regions: [u32::MAX, 0],
+                vertices: [u32::MAX, 0],
+                first,
+                count: tets.len() as u32,
+                open_faces: 0,
+                bytes: 0,
+                edge_max: 0.0,
+            },
+            digest: Digest::default(),
+            bins: [0; QUALITY_BINS],
+            worst: 0.0,
+            worst_tet: first,
+            cosines: known,
+            volumes: Vec::with_capacity(tets.len()),
         };
-        let mut buffers = (std::mem::take(&mut self.corners), std::mem::take(&mut self.shapes));
-        let (corners, shapes) = (&mut buffers.0, &mut buffers.1);
+        let SumScratch { corners, shapes } = scratch;
         // Rounded once at the end: rounding keeps the order.
         let (mut quality, mut edge_max) = ([f64::INFINITY, 0.0f64], 0.0f64);
         // A piece at a time: the corners of a whole chunk would take ten times its bytes.
@@ -168,26 +246,20 @@ impl SubdomainTotals {
                 ]);
             }
             // Shapes in parallel, sums in order: the same for any number of threads.
-            let known = self.cosines;
+            let known = sums.cosines;
             map_into(corners, shapes, |[a, b, c, d]| {
                 Shape::beyond([a.point, b.point, c.point, d.point], known)
             });
             let known = piece.iter().zip(&*corners).zip(&*shapes);
-            let mut run = RegionRun::begin(piece[0].region, &self.regions);
             for (place, ((tet, corners), shape)) in (first..).zip(known) {
                 let [a, b, c, d] = corners;
-                self.digest.add_tet([a.mix, b.mix, c.mix, d.mix], tet.region, rank);
+                sums.digest.add_tet([a.mix, b.mix, c.mix, d.mix], tet.region, rank);
                 corners.iter().for_each(|c| extend(&mut bounds, c.point));
-                self.add_shape(place, shape);
-                if run.region != tet.region {
-                    run.end(&mut self.regions);
-                    run = RegionRun::begin(tet.region, &self.regions);
-                }
-                run.totals.tets += 1;
-                run.totals.volume += shape.volume;
-                summary.volume += shape.volume;
+                sums.add_shape(place, shape);
                 edge_max = edge_max.max(shape.edge_max);
                 quality = [quality[0].min(shape.quality), quality[1].max(shape.quality)];
+                let summary = &mut sums.summary;
+                summary.volume += shape.volume;
                 let [least, most] = summary.regions;
                 summary.regions = [least.min(tet.region), most.max(tet.region)];
                 for v in tet.nodes {
@@ -195,13 +267,11 @@ impl SubdomainTotals {
                     summary.vertices = [least.min(v), most.max(v)];
                 }
             }
-            run.end(&mut self.regions);
         }
-        (self.corners, self.shapes) = buffers;
-        summary.bounds = array(&bounds);
-        summary.quality = quality.map(|q| q as f32);
-        summary.edge_max = rounded_up(edge_max);
-        Ok(summary)
+        sums.summary.bounds = array(&bounds);
+        sums.summary.quality = quality.map(|q| q as f32);
+        sums.summary.edge_max = rounded_up(edge_max);
+        Ok(sums)
     }
 
     fn add_shape(&mut self, place: u32, shape: &Shape) {
@@ -212,17 +282,6 @@ impl SubdomainTotals {
         }
         let [least, most] = self.cosines;
         self.cosines = [least.min(shape.cosines[0]), most.max(shape.cosines[1])];
-        self.volume += shape.volume;
-    }
-
-    /// The table of qualities.
-    pub fn quality(&self) -> QualityRow {
-        let angle = |cosine: f64| cosine.clamp(-1.0, 1.0).acos();
-        QualityRow {
-            bins: self.bins,
-            worst: self.worst,
-            worst_tet: self.worst_tet,
-            dihedral: [angle(self.cosines[1]), angle(self.cosines[0])],
-        }
+        self.volumes.push(shape.volume);
     }
 }

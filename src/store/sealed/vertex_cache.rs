@@ -46,6 +46,46 @@ pub fn input_index(id: u64) -> Option<u32> {
     (id.owner == Owner::Surface).then_some(id.index)
 }
 
+/// All vertices of a sub-domain, for several threads.
+pub(super) struct AllVertices<'a> {
+    firsts: &'a [u32],
+    chunks: Vec<&'a [Corner]>,
+}
+
+impl AllVertices<'_> {
+    /// A reader for one thread.
+    pub fn reader(&self) -> VertexReader<'_> {
+        VertexReader { all: self, last: [(0, &[]); 2] }
+    }
+}
+
+/// Finds vertices by number.
+pub(super) struct VertexReader<'a> {
+    all: &'a AllVertices<'a>,
+    /// The last two chunks used: first vertex and vertices.
+    last: [(u32, &'a [Corner]); 2],
+}
+
+impl VertexReader<'_> {
+    /// The corners of a tetrahedron; `None` if there is no such vertex.
+    #[inline(always)]
+    pub fn corners(&mut self, [a, b, c, d]: [u32; 4]) -> Option<[Corner; 4]> {
+        Some([self.corner(a)?, self.corner(b)?, self.corner(c)?, self.corner(d)?])
+    }
+
+    #[inline(always)]
+    fn corner(&mut self, v: u32) -> Option<Corner> {
+        for (first, chunk) in self.last {
+            if let Some(&corner) = chunk.get(v.wrapping_sub(first) as usize) {
+                return Some(corner);
+            }
+        }
+        let at = self.all.firsts.partition_point(|&first| first <= v).checked_sub(1)?;
+        self.last = [(self.all.firsts[at], self.all.chunks[at]), self.last[0]];
+        self.all.chunks[at].get((v - self.all.firsts[at]) as usize).copied()
+    }
+}
+
 /// The vertices of a resident chunk.
 #[derive(Clone, Copy)]
 struct ResidentChunk {
@@ -179,6 +219,25 @@ impl VertexCache {
             *corner = self.corner(file, v)?;
         }
         Ok(corners)
+    }
+
+    /// All vertices, if the budget has room for them.
+    ///
+    /// Errors: a damaged chunk.
+    pub(super) fn all(
+        &mut self,
+        file: &mut StoreFile,
+    ) -> Result<Option<AllVertices<'_>>, SealedError> {
+        if self.n_vertices as usize * size_of::<Corner>() > self.bytes_max {
+            return Ok(None);
+        }
+        for chunk in 0..self.firsts.len() {
+            if self.places[chunk] == NOT_RESIDENT {
+                self.load(file, chunk)?;
+            }
+        }
+        let chunks = self.places.iter().map(|&place| &self.resident[place as usize][..]);
+        Ok(Some(AllVertices { firsts: &self.firsts, chunks: chunks.collect() }))
     }
 
     #[cold]

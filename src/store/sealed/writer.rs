@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use tetdb_schema::chunk::{
     ChunkKind, ChunkRecord, Packer, RangeSummary, TetSummary, VertexSummary,
 };
@@ -13,10 +15,10 @@ use tetdb_schema::unsealed::TetLinks;
 use super::SealedError;
 use super::batch::Batch;
 use super::form::{Cut, Cutter};
-use super::totals::{SubdomainTotals, array, count_open};
+use super::totals::{ChunkSums, SubdomainTotals, SumScratch, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use tetdb_base::geom::{Aabb, Point};
-use tetdb_base::storage::{DiskPath, StoreFile, join};
+use tetdb_base::storage::{DiskPath, StoreFile, join, parallel, spare_threads};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::totals::{InterfaceSide, RegionTotals};
 
@@ -31,8 +33,8 @@ pub struct Sealed {
     pub interfaces: Vec<InterfaceSide>,
 }
 
-/// Tetrahedra packed at once: a chunk or two, 2 MB.
-const TETS_AT_ONCE: usize = SealedTet::COUNT_MAX;
+/// Tetrahedra taken at once: some chunks, 2.5 MB.
+const TETS_AT_ONCE: usize = 4 * SealedTet::COUNT_MAX;
 
 /// Writes one sub-domain, once.
 ///
@@ -60,6 +62,7 @@ pub struct SealedWriter {
     face_chunks: Vec<RangeSummary<true>>,
     pairs: FacePairs,
     totals: SubdomainTotals,
+    scratch: SumScratch,
     interfaces: BTreeMap<(u32, u32), (u64, Digest)>,
 }
 
@@ -109,6 +112,7 @@ impl SealedWriter {
             face_chunks: Vec::new(),
             pairs: FacePairs::new(SealedTet::COUNT_MAX),
             totals: SubdomainTotals::default(),
+            scratch: SumScratch::default(),
             interfaces: BTreeMap::new(),
         })
     }
@@ -120,7 +124,7 @@ impl SealedWriter {
         assert!(self.cache.is_none(), "vertices come before tetrahedra");
         let rank = self.subdomain.rank();
         let cut = self.vertices.push(vertex, |v| v.to_working(rank));
-        if let Some(chunk) = cut.map_err(self.io())? {
+        for chunk in cut.map_err(self.io())? {
             self.put_vertices(chunk)?;
         }
         Ok(())
@@ -185,7 +189,7 @@ impl SealedWriter {
     /// Adds some thousands of tetrahedra, rotated ([`SealedTet::rotated`]), each with the data that only a working page keeps. The number of
     /// each is its place in the stream.
     ///
-    /// One thread takes and packs them while another sums up those before. The file is smallest when they come sorted by their nodes.
+    /// Threads pack some while others sum up those before. The file is smallest when they come sorted by their nodes.
     /// Errors: those of `tets`; the disk; a vertex that was not pushed.
     pub fn push_tets<E: From<SealedError> + Send>(
         &mut self,
@@ -196,28 +200,34 @@ impl SealedWriter {
         let before = std::mem::take(&mut self.packed);
         let (cutter, packed, pairs) = (&mut self.tets, &mut self.packed, &mut self.pairs);
         let pack = || {
-            let open = before.iter().map(|cut| count_open(pairs, &cut.records));
-            let open: Vec<u32> = open.collect();
             for tet in tets.take(TETS_AT_ONCE) {
                 let (tet, place) = tet?;
                 debug_assert_eq!(tet, tet.rotated());
                 let cut = cutter.push(tet, |tet| tet.to_working(&place));
                 packed.extend(cut.map_err(&io)?);
             }
-            Ok::<_, E>(open)
+            Ok::<_, E>(())
         };
         let cache = self.cache.as_mut().expect("vertices have ended");
-        let (file, totals) = (&mut self.file, &mut self.totals);
+        let (file, scratch, known) = (&mut self.file, &mut self.scratch, self.totals.cosines);
         let sum_up = || {
-            let mut corners_of = |tet: &SealedTet| cache.corners(file, tet.nodes);
-            let add =
-                |cut: &Cut<SealedTet>| totals.add(cut.first, &cut.records, rank, &mut corners_of);
-            before.iter().map(add).collect::<Result<Vec<_>, _>>()
+            if let Some(sums) = sum_in_parallel(&before, rank, known, cache, file)? {
+                return Ok(sums);
+            }
+            let sums = before.iter().map(|cut| {
+                let corners_of = |tet: &SealedTet| cache.corners(file, tet.nodes);
+                let tets = (cut.first, &cut.records[..]);
+                let sums = ChunkSums::of(tets, rank, known, scratch, corners_of)?;
+                Ok((sums, count_open(pairs, &cut.records)))
+            });
+            sums.collect::<Result<Vec<_>, SealedError>>()
         };
-        let (open, summaries) = join(pack, sum_up);
-        for ((cut, mut summary), open) in before.into_iter().zip(summaries?).zip(open?) {
-            (summary.open_faces, summary.bytes) = (open, cut.bytes());
-            self.tet_chunks.push(summary);
+        let (packed, sums) = join(pack, sum_up);
+        packed?;
+        for (cut, (mut sums, open)) in before.into_iter().zip(sums?) {
+            self.totals.add_sums(&cut.records, &sums);
+            (sums.summary.open_faces, sums.summary.bytes) = (open, cut.bytes());
+            self.tet_chunks.push(sums.summary);
             self.put(cut.values)?;
         }
         assert!(
@@ -240,7 +250,7 @@ impl SealedWriter {
     /// Errors: the disk.
     pub fn push_facet(&mut self, facet: SealedFacet) -> Result<(), SealedError> {
         let cut = self.facets.push(facet, SealedFacet::to_working);
-        if let Some(chunk) = cut.map_err(self.io())? {
+        for chunk in cut.map_err(self.io())? {
             self.facet_chunks.push(summary(&chunk));
             self.put(chunk.values)?;
         }
@@ -259,7 +269,7 @@ impl SealedWriter {
         side.1.add_face(corners.map(|c| c.mix), face.cut);
         let rank = self.subdomain.rank();
         let cut = self.faces.push(face, |face| face.to_working(rank));
-        if let Some(chunk) = cut.map_err(self.io())? {
+        for chunk in cut.map_err(self.io())? {
             self.face_chunks.push(summary(&chunk));
             self.put(chunk.values)?;
         }
@@ -345,6 +355,32 @@ impl SealedWriter {
         };
         Ok(Sealed { row, regions: totals.regions, interfaces })
     }
+}
+
+/// Sums and open faces of chunks, side by side; `None` if no thread is to spare, if not all vertices fit the cache, or if one does not exist.
+///
+/// Errors: those of reading vertices.
+fn sum_in_parallel(
+    cuts: &[Cut<SealedTet>],
+    rank: u32,
+    known: [f64; 2],
+    cache: &mut VertexCache,
+    file: &mut StoreFile,
+) -> Result<Option<Vec<(ChunkSums, u32)>>, SealedError> {
+    if cuts.len() < 2 || spare_threads() < 2 {
+        return Ok(None);
+    }
+    let Some(vertices) = cache.all(file)? else {
+        return Ok(None);
+    };
+    let sum = |scratch: &mut SumScratch, cut: &Cut<SealedTet>| {
+        let mut reader = vertices.reader();
+        let corners_of = |tet: &SealedTet| reader.corners(tet.nodes).ok_or(());
+        let tets = (cut.first, &cut.records[..]);
+        let sums = ChunkSums::of(tets, rank, known, scratch, corners_of).ok()?;
+        Some((sums, count_open(&mut FacePairs::new(cut.records.len()), &cut.records)))
+    };
+    Ok(parallel(|| cuts.par_iter().map_init(SumScratch::default, sum).collect()))
 }
 
 fn summary<R, const IS_FACE: bool>(chunk: &Cut<R>) -> RangeSummary<IS_FACE> {

@@ -5,7 +5,7 @@
 //! 2. tetrahedra are sorted by their new numbers, smallest vertex first, which also follows the curve;
 //! 3. their required faces are sorted by vertices and joined with the facets, which gives each facet its tetrahedra.
 
-use tetdb_schema::ids::{Owner, VertexId};
+use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 use tetdb_schema::page::{NONE, RECORDS};
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
 use tetdb_schema::unsealed::TetLinks;
@@ -16,9 +16,11 @@ use super::target::SealTarget;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::geom::HilbertFrame;
-use tetdb_base::storage::{KeyedId, Pages, Sorted, Sorter, check_cancelled, kind};
+use tetdb_base::storage::{
+    KeyedId, Pages, SortRecord, Sorted, Sorter, StorageError, check_cancelled, kind,
+};
 use tetdb_kernel::mesh::anatomy::FACES;
-use tetdb_kernel::mesh::{Mesh, Scan, VertexTag, dense, scan_parts, tets_of_page};
+use tetdb_kernel::mesh::{Mesh, Scan, VertexTag, dense, scan_parts, sparse, tets_of_page};
 use tetdb_store::sealed::{Form, Sealed, SealedWriter, sorted_face};
 
 /// Writes `mesh` to `target`, with the order and numbers of a sealed sub-domain in every storage form.
@@ -61,55 +63,108 @@ fn vertices<P: Pages>(
     watch: &Watcher,
 ) -> Result<(), PipelineError> {
     let frame = HilbertFrame::new(&target.bounds);
-    let mut sorter = Sorter::new(target.scratch, target.memory / 4);
-    for v in mesh.vertex_ids() {
-        // A surface vertex between two empty regions has no tetrahedron, but its facets are still written.
-        if mesh.tet_of(v) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
-            continue;
-        }
-        let key = frame.index(mesh.point(v));
-        sorter.push(KeyedId { key, id: v })?;
-    }
-    for (local, record) in sorter.finish()?.enumerate() {
-        let v = record?.id;
-        let local = local as u32;
-        mesh.set_scratch(dense(v), local);
-        let (point, h) = mesh.point_and_size(v);
-        let (vertex_tag, owner_index) = mesh.vertex_attribute(v);
-        let (tag, id) = match vertex_tag {
-            VertexTag::Surface => {
-                let id = VertexId { owner: Owner::Surface, index: owner_index };
-                (tag::SURFACE, id.number())
-            }
-            VertexTag::Interface => {
-                let (cut, index) = mesh.interface_vertex(v);
-                let owner = Owner::Cut(cut);
-                (tag::INTERFACE, VertexId { owner, index }.number())
-            }
-            VertexTag::Steiner => (tag::STEINER, SealedVertex::own_id(target.subdomain, local)),
-            _ => (tag::FREE, SealedVertex::own_id(target.subdomain, local)),
-        };
-        writer.push_vertex(SealedVertex { point: point.to_array(), h, tag, id })?;
-        if local.is_multiple_of(65_536) {
-            report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+    let mut sorter = Sorter::<KeyedId>::new(target.scratch, target.memory / 4);
+    let ids: Vec<u32> = mesh.vertex_ids().step_by(IDS).collect();
+    for batch in ids.chunks(BATCH) {
+        for keys in scan_parts(mesh, batch, &Keys(frame)) {
+            sorter.extend(&keys)?;
         }
     }
-    Ok(())
+    let (mut order, mut local) = (sorter.finish()?, 0);
+    loop {
+        let ids = order.by_ref().take(IDS * BATCH).map(|record| Ok::<_, StorageError>(record?.id));
+        let ids: Vec<u32> = ids.collect::<Result<_, _>>()?;
+        if ids.is_empty() {
+            return Ok(());
+        }
+        report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+        let scan = Vertices { ids: &ids, first: local, subdomain: target.subdomain };
+        let parts: Vec<u32> = (0..ids.len().div_ceil(IDS) as u32).collect();
+        for vertices in scan_parts(mesh, &parts, &scan) {
+            for vertex in vertices {
+                writer.push_vertex(vertex)?;
+            }
+        }
+        for v in ids {
+            mesh.set_scratch(dense(v), local);
+            local += 1;
+        }
+    }
 }
 
-/// Pages scanned before their records go to the sorter: 4 MB of tetrahedra.
+/// Vertices scanned as one part.
+const IDS: usize = 1024;
+
+/// Scan that returns the keys of the vertices from one on.
+struct Keys(HilbertFrame);
+
+impl Scan for Keys {
+    type Part = u32;
+    type Output = Vec<<KeyedId as SortRecord>::Bytes>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &first: &u32) -> Self::Output {
+        let mut keys = Vec::with_capacity(IDS);
+        let ids = (dense(first)..dense(mesh.vertex_ids_end())).take(IDS).map(sparse);
+        for v in ids {
+            // A surface vertex between two empty regions has no tetrahedron, but its facets are still written.
+            if mesh.tet_of(v) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
+                continue;
+            }
+            let key = self.0.index(mesh.point(v));
+            keys.push(KeyedId { key, id: v }.to_bytes());
+        }
+        keys
+    }
+}
+
+/// Scan that returns the records of vertices with these ids, `IDS` at a time; `first` is the new number of the first.
+struct Vertices<'a> {
+    ids: &'a [u32],
+    first: u32,
+    subdomain: SubdomainId,
+}
+
+impl Scan for Vertices<'_> {
+    type Part = u32;
+    type Output = Vec<SealedVertex>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &part: &u32) -> Vec<SealedVertex> {
+        let ids = self.ids.iter().zip(self.first..).skip(part as usize * IDS).take(IDS);
+        let record = |(&v, local)| {
+            let (point, h) = mesh.point_and_size(v);
+            let (vertex_tag, owner_index) = mesh.vertex_attribute(v);
+            let (tag, id) = match vertex_tag {
+                VertexTag::Surface => {
+                    let id = VertexId { owner: Owner::Surface, index: owner_index };
+                    (tag::SURFACE, id.number())
+                }
+                VertexTag::Interface => {
+                    let (cut, index) = mesh.interface_vertex(v);
+                    let owner = Owner::Cut(cut);
+                    (tag::INTERFACE, VertexId { owner, index }.number())
+                }
+                VertexTag::Steiner => (tag::STEINER, SealedVertex::own_id(self.subdomain, local)),
+                _ => (tag::FREE, SealedVertex::own_id(self.subdomain, local)),
+            };
+            SealedVertex { point: point.to_array(), h, tag, id }
+        };
+        ids.map(record).collect()
+    }
+}
+
+/// Parts scanned before their records go on: 4 MB of tetrahedra.
 const BATCH: usize = 64;
 
 fn sort_tets<P: Pages>(
     mesh: &mut Mesh<P>,
     target: &SealTarget,
 ) -> Result<Sorted<TetRecord>, PipelineError> {
-    let mut sorter = Sorter::new(target.scratch, target.memory / 4);
+    let mut sorter = Sorter::<TetRecord>::new(target.scratch, target.memory / 4);
     let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
     for batch in pages.chunks(BATCH) {
         check_cancelled();
-        for record in scan_parts(mesh, batch, &Records).into_iter().flatten() {
-            sorter.push(record)?;
+        for records in scan_parts(mesh, batch, &Records) {
+            sorter.extend(&records)?;
         }
     }
     Ok(sorter.finish()?)
@@ -120,9 +175,9 @@ struct Records;
 
 impl Scan for Records {
     type Part = u32;
-    type Output = Vec<TetRecord>;
+    type Output = Vec<<TetRecord as SortRecord>::Bytes>;
 
-    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<TetRecord> {
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Self::Output {
         let mut records = Vec::with_capacity(RECORDS);
         tets_of_page(mesh, page, |mesh, t, tet| {
             let mut nodes = [0; 4];
@@ -138,7 +193,8 @@ impl Scan for Records {
                     required |= u8::from(tet.is_required(old)) << i;
                 }
             }
-            records.push(TetRecord { nodes: rotated.nodes, region, flags, required });
+            let record = TetRecord { nodes: rotated.nodes, region, flags, required };
+            records.push(record.to_bytes());
         });
         records
     }
