@@ -17,7 +17,7 @@ mod values;
 
 pub use codec::{Decoder, Encoder};
 pub use columns::{ColumnWriter, Malformed};
-pub use packer::{PackedChunk, Packer, Part};
+pub use packer::{PackedChunk, Packer};
 pub use summaries::{FieldSummary, RangeSummary, TetSummary, VertexSummary, is_box};
 pub use values::FieldWord;
 
@@ -141,7 +141,7 @@ pub enum ChunkDamage {
 }
 
 /// A record that can be stored in chunks.
-pub trait ChunkRecord: Copy + Send + Sync {
+pub trait ChunkRecord: Copy {
     /// The kind of its chunks.
     const KIND: ChunkKind;
     /// Largest number of records of a chunk, whatever their compressed size. Bounds the memory for decoding.

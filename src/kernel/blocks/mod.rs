@@ -36,13 +36,14 @@ use crate::optimize::{Mode, OperationCounts};
 use brick::Bricks;
 use divide::Divider;
 pub use field::Field;
-use partition::KdPartition;
+use partition::{BLOCK_TETS, KdPartition};
 pub use placement::{Everywhere, PlacementRule};
 use region::Region;
 pub use report::RefineReport;
+use scaffold::COARSER;
 use smooth::Smoother;
 use tasks::Graph;
-use tetdb_base::storage::{DiskPath, Pages, spare_threads};
+use tetdb_base::storage::{DiskPath, Pages, StorageError, raise, spare_threads};
 
 /// The first of two visits of a block; the second smooths and improves it. Each has the margin in that place of `MARGINS`.
 const DIVIDE: usize = 0;
@@ -56,6 +57,8 @@ pub struct BlockReport {
     pub operations: OperationCounts,
 }
 
+/// Fewest tetrahedra of the scaffold's lengths that are worth a saturation of their own.
+const COARSE_TETS: f64 = 20_000.0;
 /// Margins for what was put off by all blocks, in wanted lengths.
 const WIDER_MARGINS: [f64; 3] = [8.0, 24.0, 80.0];
 
@@ -71,9 +74,19 @@ pub fn saturate<P: Pages>(
     dir: &DiskPath,
     progress: &mut dyn FnMut(u64),
 ) -> BlockReport {
-    let scaffold = scaffold::build(mesh, field);
+    let mut scaffold = 0;
+    if !field.place.is_partial() {
+        let in_voids = scaffold::tets_in_voids(mesh, field);
+        if in_voids > COARSE_TETS.max(f64::from(mesh.n_tets())) {
+            scaffold += saturate_coarser(mesh, field, dir);
+        }
+    }
+    scaffold += scaffold::build(mesh, field);
     let partition = KdPartition::new(load::sample(mesh, field), field.bounds, field.h);
     let n_bricks = partition.n_bricks();
+    if partition.load() > TETS_MAX {
+        raise(StorageError::TooMany { what: "tetrahedra" });
+    }
     let memory = Memory::of(mesh, &partition);
     let bricks = Bricks::new(n_bricks, memory.bricks / 2, Some(dir.clone()));
     mesh.pages_mut().use_at_most(memory.pages_at_first);
@@ -111,6 +124,23 @@ pub fn saturate<P: Pages>(
         report.refine.over_constrained = over_constrained;
     }
     report
+}
+
+/// Saturates the mesh for lengths of the scaffold: in a large void that takes less work than inserting its points one by one into
+/// tetrahedra from wall to wall, and it is done in blocks. Returns the number of new vertices.
+fn saturate_coarser<P: Pages>(mesh: &mut Mesh<P>, field: &Field, dir: &DiskPath) -> u64 {
+    for v in mesh.vertex_ids() {
+        let size = mesh.size(v);
+        mesh.set_size(v, COARSER as f32 * size);
+    }
+    let h = |p| COARSER * (field.h)(p);
+    let coarser = Field { h: &h, place: field.place, bounds: field.bounds };
+    let made = saturate(mesh, &coarser, Mode::None, dir, &mut |_| ()).refine.inserted;
+    for v in mesh.vertex_ids() {
+        let p = mesh.point(v);
+        mesh.set_size(v, (field.h)(p) as f32);
+    }
+    made
 }
 
 /// All that visits share.
@@ -217,7 +247,10 @@ struct Memory {
     threads: usize,
 }
 
-/// Bytes of a visit: arrays of a region with its margin, and its bricks twice.
+/// Most tetrahedra that a mesh has ids for. What is predicted to have more is not begun: its blocks would have no bound.
+const TETS_MAX: f64 = (1 << 30) as f64;
+/// Bytes of a visit of a block of the usual size: arrays of a region with its margin, and its bricks twice. In large sub-domains blocks are
+/// larger, since their number is bounded.
 const VISIT_BYTES: u64 = 16 << 20;
 /// Bytes of bricks per predicted tetrahedron.
 const TET_BYTES: u64 = 50;
@@ -229,13 +262,15 @@ impl Memory {
         let Some([used, most]) = mesh.pages().bytes_used() else {
             return Self { bricks: usize::MAX, pages: u64::MAX, pages_at_first: u64::MAX, threads };
         };
-        let load: f64 = partition.blocks.iter().map(|b| b.load).sum();
+        let load = partition.load();
+        let largest = partition.blocks.iter().map(|b| b.load).fold(BLOCK_TETS, f64::max);
+        let visit = (VISIT_BYTES as f64 * (largest / BLOCK_TETS)) as u64;
         let wanted = (1.5 * load) as u64 * TET_BYTES;
-        if used + 2 * wanted + threads as u64 * VISIT_BYTES <= most {
+        if used + 2 * wanted + threads as u64 * visit <= most {
             return Self { bricks: usize::MAX, pages: most, pages_at_first: most, threads };
         }
-        let threads = threads.min((most / 2 / VISIT_BYTES).max(1) as usize);
-        let rest = most.saturating_sub(threads as u64 * VISIT_BYTES).max(most / 4);
+        let threads = threads.min((most / 2 / visit).max(1) as usize);
+        let rest = most.saturating_sub(threads as u64 * visit).max(most / 4);
         Self {
             bricks: (rest - rest / 8) as usize,
             pages: rest / 8,

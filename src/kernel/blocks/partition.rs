@@ -8,7 +8,7 @@ use super::load::Sample;
 use tetdb_base::geom::{Aabb, Point};
 
 /// Tetrahedra of a block when it is finished.
-const BLOCK_TETS: f64 = 32_000.0;
+pub(super) const BLOCK_TETS: f64 = 32_000.0;
 /// A mesh is divided into at least so many blocks, unless these were smaller than [`BLOCK_TETS_MIN`].
 const BLOCKS_MIN: f64 = 60.0;
 const BLOCK_TETS_MIN: f64 = 6_000.0;
@@ -104,6 +104,11 @@ impl KdPartition {
 
     pub fn n_bricks(&self) -> usize {
         self.bricks.len()
+    }
+
+    /// Predicted tetrahedra of all blocks.
+    pub fn load(&self) -> f64 {
+        self.blocks.iter().map(|b| b.load).sum()
     }
 
     /// The brick of a place.

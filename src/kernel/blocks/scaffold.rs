@@ -8,13 +8,14 @@ use crate::delaunay::Kernel;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGES, FACES, FROZEN, MARK};
 use crate::mesh::{Mesh, Scan, Tet, scan_parts, tets_of_page};
+use crate::sizing::TETS_PER_LOAD;
 use tetdb_base::geom::{HilbertFrame, Point, mix, orient};
 use tetdb_base::storage::{Pages, check_cancelled, kind};
 
 use super::spawn::center;
 
 /// Wanted lengths for which one length of the scaffold stands.
-const COARSER: f64 = 2.5;
+pub(super) const COARSER: f64 = 2.5;
 /// Tetrahedra with an edge longer than this, in lengths of the scaffold, get a point.
 const LONG: f64 = 2.0;
 /// Least distance to a vertex in lengths of the scaffold.
@@ -122,11 +123,45 @@ impl Scan for Long<'_, '_> {
     }
 }
 
+/// Predicts how many tetrahedra of the scaffold's lengths will be where tetrahedra are too long for it now.
+pub(super) fn tets_in_voids<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> f64 {
+    let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
+    scan_parts(mesh, &pages, &Voids(field)).into_iter().sum()
+}
+
+/// Scan that predicts the tetrahedra in place of those of a page that are too long.
+struct Voids<'a, 'b>(&'a Field<'b>);
+
+impl Scan for Voids<'_, '_> {
+    type Part = u32;
+    type Output = f64;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> f64 {
+        let mut sum = 0.0;
+        tets_of_page(mesh, page, |mesh, _, tet| {
+            let p = mesh.points(&tet);
+            let least =
+                mesh.ends(&tet).iter().map(|e| f64::from(e.h)).fold(f64::INFINITY, f64::min);
+            if longest(&p) > (LONG * COARSER * least).powi(2) {
+                let length = COARSER * (self.0.h)((p[0] + p[1] + p[2] + p[3]) * 0.25);
+                let volume = orient(p[0], p[1], p[2], p[3]) / 6.0;
+                sum += TETS_PER_LOAD * volume / (length * length * length);
+            }
+        });
+        sum
+    }
+}
+
+/// The square of the longest edge.
+fn longest(p: &[Point; 4]) -> f64 {
+    EDGES.iter().map(|&[i, j]| (p[i] - p[j]).length_squared()).fold(0.0, f64::max)
+}
+
 /// The point that a long tetrahedron gets, and the length wanted there.
 fn point_of<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, field: &Field) -> Option<(Point, f64)> {
     let ends = mesh.ends(tet);
     let p = mesh.points(tet);
-    let longest = EDGES.iter().map(|&[i, j]| (p[i] - p[j]).length_squared()).fold(0.0, f64::max);
+    let longest = longest(&p);
     let least = ends.iter().map(|e| f64::from(e.h)).fold(f64::INFINITY, f64::min);
     let is_long = |h: f64| longest > (LONG * COARSER * h) * (LONG * COARSER * h);
     let middle = (p[0] + p[1] + p[2] + p[3]) * 0.25;

@@ -6,6 +6,11 @@ use tetdb_base::storage::StoreFile;
 /// Most bytes of one commit; redb's cache is three times a batch, or every page is written twice.
 const BATCH_BYTES_MAX: usize = 16 << 20;
 
+/// Largest useful cache of redb, for a file that is written with so much memory.
+pub(super) fn cache_bytes(memory_bytes: usize) -> usize {
+    (memory_bytes / 2).min(3 * BATCH_BYTES_MAX)
+}
+
 /// Values waiting for a commit.
 pub(super) struct Batch {
     values: Vec<(u64, Vec<u8>)>,

@@ -8,8 +8,7 @@ use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Packer};
 use tetdb_schema::record::{CoarseFace, CoarseTet, CoarseVertex, WorkingFacet};
 
 use super::SealedError;
-use super::batch::Batch;
-use super::form::packer;
+use super::batch::{Batch, cache_bytes};
 use super::form::Loader;
 use super::subdomain::Chunks;
 use tetdb_base::storage::{DiskPath, StoreFile};
@@ -43,14 +42,14 @@ impl CoarseWriter {
         let io = |e| SealedError::io(path.path(), e);
         Ok(Self {
             path: path.clone(),
-            file: StoreFile::create_unsynced(path, memory_bytes / 2)?,
+            file: StoreFile::create_unsynced(path, cache_bytes(memory_bytes))?,
             batch: Batch::new(memory_bytes),
             rank,
             generation,
-            vertices: packer(rank, generation).map_err(io)?,
-            tets: packer(rank, generation).map_err(io)?,
-            facets: packer(rank, generation).map_err(io)?,
-            faces: packer(rank, generation).map_err(io)?,
+            vertices: Packer::new(rank, generation).map_err(io)?,
+            tets: Packer::new(rank, generation).map_err(io)?,
+            facets: Packer::new(rank, generation).map_err(io)?,
+            faces: Packer::new(rank, generation).map_err(io)?,
         })
     }
 
@@ -109,10 +108,10 @@ fn push<R: ChunkRecord>(
     record: R,
 ) -> Result<(), SealedError> {
     let packed = packer.push(record);
-    for chunk in packed.map_err(|e| SealedError::io(file.path(), e))? {
-        batch.push(file, chunk.address.key(), chunk.value)?;
+    match packed.map_err(|e| SealedError::io(file.path(), e))? {
+        Some(chunk) => batch.push(file, chunk.address.key(), chunk.value),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 fn end<R: ChunkRecord>(

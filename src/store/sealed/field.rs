@@ -12,7 +12,7 @@ use tetdb_schema::chunk::{
 use tetdb_schema::field::{FieldPart, FieldPlace, FieldRange, FieldRow};
 use tetdb_schema::row::guarded_bytes;
 
-use super::batch::Batch;
+use super::batch::{Batch, cache_bytes};
 use super::form::Loader;
 use super::{SealedError, Subdomain};
 use tetdb_base::storage::{DiskPath, StoreFile, check_cancelled};
@@ -76,7 +76,7 @@ impl FieldWriter {
             bytes: 0,
         };
         Ok(Self {
-            file: StoreFile::create_unsynced(&path, memory_bytes / 2)?,
+            file: StoreFile::create_unsynced(&path, cache_bytes(memory_bytes))?,
             batch: Batch::new(memory_bytes),
             packer: Packer::new(rank, serial).map_err(io)?,
             field: field.clone(),
@@ -110,7 +110,7 @@ impl FieldWriter {
             while let Some(cut) =
                 self.packer.cut().map_err(|e| SealedError::io(self.path.path(), e))?
             {
-                self.put([cut])?;
+                self.put(Some(cut))?;
             }
             let pieces = self.packer.chunks() - piece;
             let FieldRange { low, high, nan } = range;
@@ -125,11 +125,11 @@ impl FieldWriter {
         Ok(())
     }
 
-    fn put<R>(&mut self, cut: impl IntoIterator<Item = PackedChunk<R>>) -> Result<(), SealedError> {
-        for chunk in cut {
-            self.batch.push(&mut self.file, chunk.address.key(), chunk.value)?;
+    fn put<R>(&mut self, cut: Option<PackedChunk<R>>) -> Result<(), SealedError> {
+        match cut {
+            Some(cut) => self.batch.push(&mut self.file, cut.address.key(), cut.value),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn put_summaries<R: ChunkRecord>(&mut self, summaries: &[R]) -> Result<u32, SealedError> {
@@ -141,7 +141,7 @@ impl FieldWriter {
             self.put(cut)?;
         }
         while let Some(cut) = packer.cut().map_err(io)? {
-            self.put([cut])?;
+            self.put(Some(cut))?;
         }
         Ok(packer.chunks())
     }

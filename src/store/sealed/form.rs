@@ -2,12 +2,12 @@
 //!
 //! Both hold the same records in the same order under the same numbers, and readers return the same.
 
-use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, PackedChunk, Packer, Part};
+use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, PackedChunk, Packer};
 use tetdb_schema::page::PageError;
 use tetdb_schema::unsealed::{PageDecoder, PagePacker, PageRecord, PageSet, WorkingWords};
 
 use super::SealedError;
-use tetdb_base::storage::{StorageError, StoreFile, for_each_mut};
+use tetdb_base::storage::{StorageError, StoreFile};
 use tetdb_schema::catalog::SubdomainState;
 use tetdb_schema::word::Word;
 
@@ -75,12 +75,6 @@ impl<R> From<PageSet<R>> for Cut<R> {
     }
 }
 
-/// A packer whose chunks are encoded side by side where threads are to spare. Errors: those of zstd.
-pub(super) fn packer<R: ChunkRecord>(subdomain: u32, generation: u32) -> std::io::Result<Packer<R>> {
-    let packer = Packer::new(subdomain, generation)?;
-    Ok(packer.encoding_with(|parts| for_each_mut(parts, Part::encode)))
-}
-
 /// Cuts a stream of records.
 pub(super) enum Cutter<R> {
     Chunks(Box<Packer<R>>),
@@ -91,7 +85,7 @@ impl<R: PageRecord> Cutter<R> {
     /// Errors: those of zstd.
     pub fn new(form: Form, subdomain: u32, generation: u32) -> std::io::Result<Self> {
         Ok(match form {
-            Form::Packed => Self::Chunks(Box::new(packer(subdomain, generation)?)),
+            Form::Packed => Self::Chunks(Box::new(Packer::new(subdomain, generation)?)),
             Form::Pages => Self::Pages(PagePacker::new(subdomain, generation)),
         })
     }
@@ -102,12 +96,10 @@ impl<R: PageRecord> Cutter<R> {
         &mut self,
         record: R,
         working: impl FnOnce(R) -> WorkingWords,
-    ) -> std::io::Result<Vec<Cut<R>>> {
+    ) -> std::io::Result<Option<Cut<R>>> {
         Ok(match self {
-            Self::Chunks(packer) => packer.push(record)?.into_iter().map(Cut::from).collect(),
-            Self::Pages(packer) => {
-                packer.push(record, working(record)).map(Cut::from).into_iter().collect()
-            }
+            Self::Chunks(packer) => packer.push(record)?.map(Cut::from),
+            Self::Pages(packer) => packer.push(record, working(record)).map(Cut::from),
         })
     }
 

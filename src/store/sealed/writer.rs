@@ -13,7 +13,7 @@ use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
 use tetdb_schema::unsealed::TetLinks;
 
 use super::SealedError;
-use super::batch::Batch;
+use super::batch::{Batch, cache_bytes};
 use super::form::{Cut, Cutter};
 use super::totals::{ChunkSums, SubdomainTotals, SumScratch, array, count_open};
 use super::{FacePairs, Form, VertexCache};
@@ -33,7 +33,7 @@ pub struct Sealed {
     pub interfaces: Vec<InterfaceSide>,
 }
 
-/// Tetrahedra taken at once: some chunks, 2.5 MB.
+/// Tetrahedra taken at once: some chunks, 6 MB.
 const TETS_AT_ONCE: usize = 4 * SealedTet::COUNT_MAX;
 
 /// Writes one sub-domain, once.
@@ -53,6 +53,8 @@ pub struct SealedWriter {
     vertex_chunks: Vec<VertexSummary>,
     cache: Option<VertexCache>,
     tets: Cutter<SealedTet>,
+    /// Tetrahedra that are taken and not yet packed.
+    taken: Vec<(SealedTet, TetLinks)>,
     /// Tetrahedra that are packed and not yet summed up and stored.
     packed: Vec<Cut<SealedTet>>,
     tet_chunks: Vec<TetSummary>,
@@ -88,7 +90,7 @@ impl SealedWriter {
         memory_bytes: usize,
     ) -> Result<Self, SealedError> {
         let path = path.into();
-        let file = StoreFile::create_unsynced(&path, memory_bytes / 2)?;
+        let file = StoreFile::create_unsynced(&path, cache_bytes(memory_bytes))?;
         let name = path.path().to_owned();
         let io = |e| SealedError::io(&name, e);
         let rank = subdomain.rank();
@@ -104,6 +106,7 @@ impl SealedWriter {
             vertex_chunks: Vec::new(),
             cache: None,
             tets: Cutter::new(form, rank, generation).map_err(io)?,
+            taken: Vec::new(),
             packed: Vec::new(),
             tet_chunks: Vec::new(),
             facets: Cutter::new(form, rank, generation).map_err(io)?,
@@ -124,7 +127,7 @@ impl SealedWriter {
         assert!(self.cache.is_none(), "vertices come before tetrahedra");
         let rank = self.subdomain.rank();
         let cut = self.vertices.push(vertex, |v| v.to_working(rank));
-        for chunk in cut.map_err(self.io())? {
+        if let Some(chunk) = cut.map_err(self.io())? {
             self.put_vertices(chunk)?;
         }
         Ok(())
@@ -189,7 +192,7 @@ impl SealedWriter {
     /// Adds some thousands of tetrahedra, rotated ([`SealedTet::rotated`]), each with the data that only a working page keeps. The number of
     /// each is its place in the stream.
     ///
-    /// Threads pack some while others sum up those before. The file is smallest when they come sorted by their nodes.
+    /// Some are taken while those before are packed, and those before these summed up, each on a thread of its own. The file is smallest when they come sorted by their nodes.
     /// Errors: those of `tets`; the disk; a vertex that was not pushed.
     pub fn push_tets<E: From<SealedError> + Send>(
         &mut self,
@@ -197,16 +200,16 @@ impl SealedWriter {
     ) -> Result<(), E> {
         self.end_vertices()?;
         let (io, rank) = (self.io(), self.subdomain.rank());
-        let before = std::mem::take(&mut self.packed);
-        let (cutter, packed, pairs) = (&mut self.tets, &mut self.packed, &mut self.pairs);
+        let (taken, before) = (std::mem::take(&mut self.taken), std::mem::take(&mut self.packed));
+        let (cutter, pairs) = (&mut self.tets, &mut self.pairs);
+        let take = || tets.take(TETS_AT_ONCE).collect::<Result<Vec<_>, E>>();
         let pack = || {
-            for tet in tets.take(TETS_AT_ONCE) {
-                let (tet, place) = tet?;
+            let mut packed = Vec::new();
+            for (tet, place) in taken {
                 debug_assert_eq!(tet, tet.rotated());
-                let cut = cutter.push(tet, |tet| tet.to_working(&place));
-                packed.extend(cut.map_err(&io)?);
+                packed.extend(cutter.push(tet, |tet| tet.to_working(&place))?);
             }
-            Ok::<_, E>(())
+            Ok::<_, std::io::Error>(packed)
         };
         let cache = self.cache.as_mut().expect("vertices have ended");
         let (file, scratch, known) = (&mut self.file, &mut self.scratch, self.totals.cosines);
@@ -222,8 +225,8 @@ impl SealedWriter {
             });
             sums.collect::<Result<Vec<_>, SealedError>>()
         };
-        let (packed, sums) = join(pack, sum_up);
-        packed?;
+        let (taken, (packed, sums)) = join(take, || join(pack, sum_up));
+        (self.taken, self.packed) = (taken?, packed.map_err(io)?);
         for (cut, (mut sums, open)) in before.into_iter().zip(sums?) {
             self.totals.add_sums(&cut.records, &sums);
             (sums.summary.open_faces, sums.summary.bytes) = (open, cut.bytes());
@@ -250,7 +253,7 @@ impl SealedWriter {
     /// Errors: the disk.
     pub fn push_facet(&mut self, facet: SealedFacet) -> Result<(), SealedError> {
         let cut = self.facets.push(facet, SealedFacet::to_working);
-        for chunk in cut.map_err(self.io())? {
+        if let Some(chunk) = cut.map_err(self.io())? {
             self.facet_chunks.push(summary(&chunk));
             self.put(chunk.values)?;
         }
@@ -269,7 +272,7 @@ impl SealedWriter {
         side.1.add_face(corners.map(|c| c.mix), face.cut);
         let rank = self.subdomain.rank();
         let cut = self.faces.push(face, |face| face.to_working(rank));
-        for chunk in cut.map_err(self.io())? {
+        if let Some(chunk) = cut.map_err(self.io())? {
             self.face_chunks.push(summary(&chunk));
             self.put(chunk.values)?;
         }
@@ -297,13 +300,14 @@ impl SealedWriter {
     /// Errors: the disk.
     pub fn finish(mut self) -> Result<Sealed, SealedError> {
         let io = self.io();
-        let mut none = std::iter::empty();
-        self.push_tets::<SealedError>(&mut none)?;
+        // What was taken is packed, and what was packed is summed up.
+        for _ in 0..2 {
+            self.push_tets::<SealedError>(&mut std::iter::empty())?;
+        }
         while let Some(chunk) = self.tets.cut().map_err(&io)? {
             self.packed.push(chunk);
         }
-        let mut none = std::iter::empty();
-        self.push_tets::<SealedError>(&mut none)?;
+        self.push_tets::<SealedError>(&mut std::iter::empty())?;
         while let Some(chunk) = self.facets.cut().map_err(&io)? {
             self.facet_chunks.push(summary(&chunk));
             self.put(chunk.values)?;

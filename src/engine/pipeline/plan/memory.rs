@@ -10,8 +10,8 @@ pub const MEMORY_MIN: u64 = 64 << 20;
 const REDB_MAX: u64 = 48 << 20;
 /// The catalog's cache and other small data of the catalog.
 const CATALOG: u64 = 3 << 20;
-/// Largest useful scratch of a phase (candidates, sort runs, chunks being encoded).
-const BUFFERS_MAX: u64 = 384 << 20;
+/// Largest useful scratch of a phase (candidates, sort runs, chunks being encoded): with it 40 million records are sorted in memory.
+const BUFFERS_MAX: u64 = 4 << 30;
 
 /// Fewest bytes of frames for each of several workers.
 const FRAMES_OF_WORKER: u64 = 24 << 20;
