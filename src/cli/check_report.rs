@@ -2,7 +2,7 @@
 
 use super::console::Console;
 use super::words::{self, count};
-use tetdb_engine::api::{Code, Defect, Surface, SurfaceReport, short, show_point};
+use tetdb_engine::api::{Code, Defect, ResolveReport, Surface, SurfaceReport, short, show_point};
 
 /// Largest number of defects of one kind, of holes and of junctions that are listed.
 const LISTED: usize = 8;
@@ -211,18 +211,18 @@ impl Printed<'_> {
             ));
             return;
         }
-        if let Some(done) = &self.report.resolving {
-            let rest = match done.n_defects {
+        if let Some(ResolveReport { done, n_defects, regions, .. }) = &self.report.resolving {
+            let rest = match *n_defects {
                 0 => String::new(),
                 n => format!("; {} left", words::count(n, "other defect")),
             };
             // The rule that fills what the parts fill together.
-            let regions = done.regions.first().map_or(String::new(), |r| format!(" --regions {r}"));
+            let regions = regions.first().map_or(String::new(), |r| format!(" --regions {r}"));
             console.line(&format!(
                 "help: `tetdb mesh {} --repair resolve{regions}` divides crossing triangles first: {} triangles divided, {} vertices added, none farther than {} from its exact place{rest}",
                 self.surfaces, done.divided, done.points_added, short(done.moved_most)
             ));
-            if done.n_defects > 0 {
+            if *n_defects > 0 {
                 self.print_wrap(console);
             }
             return;

@@ -32,12 +32,16 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         false => Existing::Keep,
     };
     Mesher::check_path(&path, existing)?;
+    let beside = input::scratch_beside(settings.clone(), &path);
     let surface = input::load_with(
         &args.surfaces,
-        (&args.repair, Some(&args.remesh)),
+        |surface| {
+            let how = (&args.repair, &args.remesh);
+            input::prepared(surface, how, &options, &beside, console)
+        },
         &args.sheets,
         &options,
-        &input::scratch_beside(settings.clone(), &path),
+        &beside,
         console,
     )?;
     let created = Mesher::with_options(surface, options)

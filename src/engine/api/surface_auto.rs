@@ -91,7 +91,7 @@ impl RepairStep {
                 let done = counts.into_iter().filter(|(n, _)| *n > 0);
                 done.map(|(n, what)| counted(n as u64, what)).collect::<Vec<_>>().join("; ")
             }
-            Self::Resolve(report) => report.in_words(),
+            Self::Resolve(report) => report.done.in_words(),
             Self::Winding(report) => report.in_words(),
             Self::Wrap(report) => report.in_words(),
         }
@@ -162,7 +162,7 @@ impl Surface {
         }
         watch("resolve crossings", 0, 0);
         if let Ok((resolved, done)) = self.clone().resolved_in(scratch) {
-            let report = resolve_report(&resolved.inner, &done, scratch)?;
+            let report = resolve_report(&resolved.inner, done, scratch)?;
             // Where another rule fills more than parity, parts overlap, and parity would leave empty what they share.
             let is_enough = report.n_defects == 0 && report.regions.is_empty();
             if done.rounds > 0 || is_enough {
