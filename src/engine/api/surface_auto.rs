@@ -14,7 +14,7 @@ use super::{
 };
 use tetdb_base::geom::{counted, short};
 use tetdb_base::storage::{ScratchSpace, attempt};
-use tetdb_base::surface::{self, closing, validate_with};
+use tetdb_base::surface::{self, Repair, closing, validate_with};
 use tetdb_repair::close::{CloseError, Watcher, close_bytes};
 use tetdb_schema::source::Source;
 
@@ -152,8 +152,7 @@ impl Surface {
         let weld = tried.last().filter(|t| t.closes && t.share <= WELD_SHARE_AUTO);
         if let Some(share) = weld.map(|t| t.share) {
             let report = self.welded_in(share, n_before);
-            if report.triangles_before != self.inner.n_triangles() || report.done.points_joined > 0
-            {
+            if report.done != Repair::default() {
                 steps.push(RepairStep::Weld(report));
             }
             if n_defects(&self)? == 0 {
@@ -194,6 +193,9 @@ impl Surface {
     fn welded_in(&mut self, share: f64, n_defects_before: u64) -> RepairReport {
         let report = self.repair_in((share > 0.0).then_some(share), n_defects_before);
         let done = &report.done;
+        if *done == Repair::default() {
+            return report;
+        }
         self.record(Origin::Welded(format!(
             "share={share:e},joined={},dropped={},divided={},turned={}",
             done.points_joined,

@@ -201,7 +201,8 @@ pub fn close(
     }
     Ok(CloseReport {
         resolve,
-        hole_area: holes.iter().map(|hole| hole.area).sum(),
+        // The sum of nothing is -0.
+        hole_area: holes.iter().map(|hole| hole.area).sum::<f64>() + 0.0,
         triangles_added: holes.iter().map(|hole| hole.triangles).sum(),
         holes,
         points_added,
