@@ -13,7 +13,7 @@ use super::oracle::Oracle;
 /// Items of one task.
 const BLOCK: usize = 1 << 12;
 /// Of fewer triangles than this, samples are nearer to each other, down to a tenth: a soup of ten triangles has few points else.
-const MANY: f64 = 1e5;
+const MANY: f64 = 1e4;
 /// A triangle is sampled with at most this many points along a side.
 const SAMPLES_MAX: f64 = 32.0;
 
