@@ -43,6 +43,14 @@ impl Printed<'_> {
         for advice in self.report.advice() {
             console.line(&format!("advice: {advice}"));
         }
+        if self.report.is_poorly_shaped() {
+            let how = "puts even triangles within 0.05% of the box diagonal in their place";
+            let line = match self.report.is_valid() {
+                true => format!("cure: `tetdb mesh {} --remesh-surface` {how}", self.surfaces),
+                false => format!("cure: --remesh-surface, added to the command below, {how}"),
+            };
+            console.line(&line);
+        }
         for suggestion in &self.report.suggestions {
             let surfaces = self.surfaces;
             let way = match suggestion.weld {
