@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::args::{CheckArgs, RepairArgs};
+use super::args::CheckArgs;
 use super::check_report::Printed;
 use super::config;
 use super::console::Console;
@@ -32,14 +32,8 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // A check writes no temporary files next to its input.
     let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
     let options = typed(config::inside_of(&args.inside))?;
-    let mut surface = input::load_with(
-        &args.surfaces,
-        (&RepairArgs::default(), None),
-        &args.sheets,
-        &options,
-        &settings,
-        console,
-    )?;
+    let mut surface =
+        input::load_with(&args.surfaces, Ok, &args.sheets, &options, &settings, console)?;
     if args.repair.is_none() {
         surface = surface.inside_settled(options.embed_outside, &settings)?;
     }
@@ -52,7 +46,7 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     let mut steps = None;
     if let Some(Some(kind)) = args.repair {
         let done;
-        (surface, done) = surface.repaired_by(kind, &settings)?;
+        (surface, done) = input::repaired_by(surface, kind, &settings)?;
         steps = Some(done);
     }
     let report = surface.report(&settings, console.is_verbose())?;

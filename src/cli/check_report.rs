@@ -2,7 +2,7 @@
 
 use super::console::Console;
 use super::words::{self, count};
-use tetdb_engine::api::{Code, Defect, Surface, SurfaceReport, short, show_point};
+use tetdb_engine::api::{Code, Defect, ResolveReport, Surface, SurfaceReport, short, show_point};
 
 /// Largest number of defects of one kind, of holes and of junctions that are listed.
 const LISTED: usize = 8;
@@ -42,6 +42,14 @@ impl Printed<'_> {
         self.print_fitness(console);
         for advice in self.report.advice() {
             console.line(&format!("advice: {advice}"));
+        }
+        if self.report.is_poorly_shaped() {
+            let how = "puts even triangles within 0.05% of the box diagonal in their place";
+            let line = match self.report.is_valid() {
+                true => format!("cure: `tetdb mesh {} --remesh-surface` {how}", self.surfaces),
+                false => format!("cure: --remesh-surface, added to the command below, {how}"),
+            };
+            console.line(&line);
         }
         for suggestion in &self.report.suggestions {
             let surfaces = self.surfaces;
@@ -211,18 +219,18 @@ impl Printed<'_> {
             ));
             return;
         }
-        if let Some(done) = &self.report.resolving {
-            let rest = match done.n_defects {
+        if let Some(ResolveReport { done, n_defects, regions, .. }) = &self.report.resolving {
+            let rest = match *n_defects {
                 0 => String::new(),
                 n => format!("; {} left", words::count(n, "other defect")),
             };
             // The rule that fills what the parts fill together.
-            let regions = done.regions.first().map_or(String::new(), |r| format!(" --regions {r}"));
+            let regions = regions.first().map_or(String::new(), |r| format!(" --regions {r}"));
             console.line(&format!(
                 "help: `tetdb mesh {} --repair resolve{regions}` divides crossing triangles first: {} triangles divided, {} vertices added, none farther than {} from its exact place{rest}",
                 self.surfaces, done.divided, done.points_added, short(done.moved_most)
             ));
-            if done.n_defects > 0 {
+            if *n_defects > 0 {
                 self.print_wrap(console);
             }
             return;

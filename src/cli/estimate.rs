@@ -25,7 +25,10 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let wide = input::scratch_beside(wide, store);
     let surface = input::load_with(
         &args.surfaces,
-        (&args.repair, Some(&args.remesh)),
+        |surface| {
+            let how = (&args.repair, &args.remesh);
+            input::prepared(surface, how, &options, &wide, console)
+        },
         &args.sheets,
         &options,
         &wide,

@@ -51,7 +51,7 @@ pub fn note_repaired(steps: &[RepairStep], console: &Console) {
 
 /// Says what was done to crossings, and which regions there are now.
 fn note_resolved(done: &ResolveReport, console: &Console) {
-    console.note(&format!("note: resolved: {}", done.in_words()));
+    console.note(&format!("note: resolved: {}", done.done.in_words()));
     if let [first, rest @ ..] = &done.regions[..] {
         let or = rest.iter().map(|rule| format!(" or --regions {rule}")).collect::<String>();
         console.note(&format!(
@@ -68,21 +68,59 @@ fn wrap_lengths(repair: &RepairArgs) -> Result<Option<SurfaceWrap>, Failure> {
         let message = "--wrap-gap and --wrap-offset belong to --repair wrap";
         return Err(Failure::new(Code::Usage, message).help("leave them out, or wrap the surface"));
     }
-    let lengths = wrap::lengths(&WrapLengths { gap, offset })?;
+    let lengths = wrap::lengths(&WrapLengths { gap, offset }, ["wrap-gap", "wrap-offset"])?;
     Ok(is_wrap.then_some(lengths))
 }
 
-/// Remeshes a surface before it is meshed with `options`.
-fn remeshed(
-    surface: &Surface,
-    args: &RemeshArgs,
+/// Repairs a surface; the error for one that goes around nothing says what is left to do.
+pub fn repaired_by(
+    surface: Surface,
+    kind: RepairKind,
+    settings: &Settings,
+) -> Result<(Surface, Vec<RepairStep>), Failure> {
+    surface.repaired_by(kind, settings).map_err(|e| match e.code() {
+        Code::NothingFilled => Failure::from(e).help(
+            "--repair wrap puts a closed surface around all of it, at an offset; a sheet inside another surface is given with --embed",
+        ),
+        _ => e.into(),
+    })
+}
+
+/// Repairs a surface if that is asked for, and says how.
+pub fn repaired(
+    surface: Surface,
+    repair: &RepairArgs,
+    settings: &Settings,
+    console: &Console,
+) -> Result<Surface, Failure> {
+    let lengths = wrap_lengths(repair)?;
+    let Some(kind) = repair.repair else { return Ok(surface) };
+    let (surface, steps) = match lengths {
+        Some(lengths) => {
+            let (wrap, done) = surface.wrapped_with(&lengths, settings)?;
+            (wrap, vec![RepairStep::Wrap(done)])
+        }
+        None => repaired_by(surface, kind, settings)?,
+    };
+    note_repaired(&steps, console);
+    Ok(surface)
+}
+
+/// Repairs and remeshes a surface before it is meshed with `options`, where that is asked for.
+pub fn prepared(
+    surface: Surface,
+    (repair, args): (&RepairArgs, &RemeshArgs),
     options: &MeshOptions,
     settings: &Settings,
     console: &Console,
 ) -> Result<Surface, Failure> {
+    let surface = repaired(surface, repair, settings, console)?;
+    if !args.remesh_surface {
+        return Ok(surface);
+    }
     let mut how = SurfaceRemesh::default().sized(&options.sizes);
     if let Some(text) = &args.remesh_tolerance {
-        how.tolerance = Length::parse("tolerance", text).map_err(Error::from)?;
+        how.tolerance = Length::parse("remesh-tolerance", text).map_err(Error::from)?;
     }
     how.feature_angle = args.remesh_angle.unwrap_or(how.feature_angle);
     let (even, report) = surface.remeshed_with(&how, settings)?;
@@ -92,10 +130,10 @@ fn remeshed(
 
 /// Reads files or generates a sample, and embeds sheets, edges and points.
 ///
-/// As `options` say, triangles are divided where edges and points lie on them, and points are moved there.
+/// `prepare` is called before anything is embedded. As `options` say, triangles are divided where edges and points lie on them, and points are moved there.
 pub fn load_with(
     arguments: &[String],
-    (repair, remesh): (&RepairArgs, Option<&RemeshArgs>),
+    prepare: impl FnOnce(Surface) -> Result<Surface, Failure>,
     sheets: &SheetArgs,
     options: &MeshOptions,
     settings: &Settings,
@@ -111,22 +149,7 @@ pub fn load_with(
         }
         names.push((file, name));
     }
-    let lengths = wrap_lengths(repair)?;
-    let mut surface = Surface::load(arguments, settings)?;
-    if let Some(kind) = repair.repair {
-        let steps;
-        (surface, steps) = match lengths {
-            Some(lengths) => {
-                let (wrap, done) = surface.wrapped_with(&lengths, settings)?;
-                (wrap, vec![RepairStep::Wrap(done)])
-            }
-            None => surface.repaired_by(kind, settings)?,
-        };
-        note_repaired(&steps, console);
-    }
-    if let Some(args) = remesh.filter(|args| args.remesh_surface) {
-        surface = remeshed(&surface, args, options, settings, console)?;
-    }
+    let mut surface = prepare(Surface::load(arguments, settings)?)?;
     if sheets.allow_open {
         let (with, n) = surface.open_parts_with(settings)?;
         surface = with;

@@ -32,12 +32,16 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         false => Existing::Keep,
     };
     Mesher::check_path(&path, existing)?;
+    let beside = input::scratch_beside(settings.clone(), &path);
     let surface = input::load_with(
         &args.surfaces,
-        (&args.repair, Some(&args.remesh)),
+        |surface| {
+            let how = (&args.repair, &args.remesh);
+            input::prepared(surface, how, &options, &beside, console)
+        },
         &args.sheets,
         &options,
-        &input::scratch_beside(settings.clone(), &path),
+        &beside,
         console,
     )?;
     let created = Mesher::with_options(surface, options)
@@ -144,10 +148,10 @@ fn finish(
         if let Some(peak) = memory::peak().filter(|_| traffic.is_some()) {
             console.line(&format!("peak memory {} of {}", memory::show(peak), memory::show(cap)));
         }
-        let page = path.with_extension("html");
-        let (store, page) = (quoted(path), quoted(&page));
+        let [page, cut] = ["html", "png"].map(|ending| quoted(path.with_extension(ending)));
+        let store = quoted(path);
         console.note(&format!(
-            "next: `tetdb report {store} {page}` shows it in a browser, `tetdb export {store} FILE.vtu` writes it for other programs"
+            "next: `tetdb report {store} {page}` shows it in a browser, `tetdb snapshot {store} {cut}` draws a cut, `tetdb export {store} FILE.vtu` writes it for other programs"
         ));
     }
     Ok(0)

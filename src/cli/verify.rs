@@ -26,17 +26,18 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
         true => store.verify(level)?,
         false => {
             let options = MeshOptions::default();
-            let mut surface = input::load_with(
+            let surface = input::load_with(
                 &args.against,
-                (&args.repair, None),
+                |surface| {
+                    let is_repaired = args.repair.repair.is_some();
+                    let surface = input::repaired(surface, &args.repair, &settings, console)?;
+                    Ok(store.repaired_alike(surface, is_repaired)?)
+                },
                 &args.sheets,
                 &options,
                 &settings,
                 console,
             )?;
-            if !embeds {
-                surface = store.repaired_alike(surface)?;
-            }
             store.verify_against(&surface, level)?
         }
     };

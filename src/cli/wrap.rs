@@ -11,12 +11,11 @@ use super::{input, memory, threads};
 use tetdb_engine::api::targets::check_target;
 use tetdb_engine::api::{Error, Length, Surface, SurfaceWrap};
 
-/// The lengths of a wrap; those not given are the usual ones.
-pub fn lengths(args: &WrapLengths) -> Result<SurfaceWrap, Failure> {
+/// The lengths of a wrap, by the names of their options; those not given are the usual ones.
+pub fn lengths(args: &WrapLengths, names: [&'static str; 2]) -> Result<SurfaceWrap, Failure> {
     let mut options = SurfaceWrap::default();
-    let both =
-        [("gap", &args.gap, &mut options.gap), ("offset", &args.offset, &mut options.offset)];
-    for (name, text, length) in both {
+    let both = [(&args.gap, &mut options.gap), (&args.offset, &mut options.offset)];
+    for (name, (text, length)) in names.into_iter().zip(both) {
         if let Some(text) = text {
             *length = Length::parse(name, text).map_err(Error::from)?;
         }
@@ -25,7 +24,7 @@ pub fn lengths(args: &WrapLengths) -> Result<SurfaceWrap, Failure> {
 }
 
 pub fn run(args: &WrapArgs, console: &Console) -> Result<u8, Failure> {
-    let options = lengths(&args.lengths)?;
+    let options = lengths(&args.lengths, ["gap", "offset"])?;
     Surface::check_format(&args.output)?;
     let inputs: Vec<PathBuf> = args.surfaces.iter().map(PathBuf::from).collect();
     if !args.force {

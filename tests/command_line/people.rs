@@ -149,6 +149,28 @@ fn check_and_estimate_expect_the_same() {
 }
 
 #[test]
+fn what_is_printed_leads_from_a_broken_surface_to_a_picture() {
+    let place = Place::new();
+    let command = |text: &str, words: &str| {
+        let start = format!("`tetdb {words} ");
+        let at = text.find(&start).unwrap_or_else(|| panic!("no {words}: {text}"));
+        let line = text[at + "`tetdb ".len()..].split('`').next();
+        line.expect("it begins with one").to_owned()
+    };
+    for kind in ["holes", "crossings", "doubled", "soup"] {
+        let file = format!("{kind}.off");
+        place.run_line(&format!("sample broken,kind={kind},seed=4 -o {file}")).succeeds();
+        let said = place.run_line(&format!("check {file}")).stdout();
+        let done = place.run_line(&command(&said, "mesh")).succeeds();
+        place.run_line(&command(&done.stderr(), "snapshot")).succeeds();
+        assert!(place.path(&format!("{kind}.png")).exists());
+    }
+    let said = place.run_line("check sample:needles,seed=2").succeeds().stdout();
+    let line = command(&said, "mesh");
+    assert!(line.ends_with("--remesh-surface"), "{line}");
+}
+
+#[test]
 fn an_open_surface_is_not_sent_to_the_command_it_comes_from() {
     let place = Place::new();
     place.write("open.off", TETRA.replace("4 4 0", "4 3 0").replace("3 0 3 2\n", ""));

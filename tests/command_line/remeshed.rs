@@ -111,7 +111,9 @@ fn a_mesh_that_begins_with_remeshing_is_resumed_and_verified() {
     assert!(size("--remesh-surface --size-expr 0.05+0.05*z") > 2 * plain);
     for (line, words) in [
         ("--remesh-tolerance 1%", "--remesh-surface"),
-        ("--remesh-surface --remesh-tolerance 0", "tolerance"),
+        ("--remesh-surface --remesh-tolerance 0", "--remesh-tolerance 0:"),
+        ("--repair wrap --wrap-gap 0", "--wrap-gap 0:"),
+        ("--repair wrap --wrap-offset x", "--wrap-offset x:"),
         ("--remesh-surface --remesh-angle 0", "feature angle"),
     ] {
         let refused = place.run_line(&format!("mesh rod.obj -o bad.tetdb {line}"));
@@ -129,6 +131,13 @@ fn a_repaired_surface_is_remeshed_and_sizes_by_place_are_on_record() {
     place.run_line(&format!("{line} -o a.tetdb")).succeeds();
     place.run_line("verify a.tetdb --full").succeeds();
     place.run_line("verify a.tetdb --against scan.stl").succeeds();
+    place.run_line("verify a.tetdb --against scan.stl --repair winding").succeeds();
+    place.write("post.obj", "v 0 0 0\nv 0.1 0 0.2\nv 0 0.1 0.2\nf 1 2 3\n");
+    place.run_line(&format!("{line} --embed post.obj -o c.tetdb")).succeeds();
+    for repair in ["", "--repair auto"] {
+        let line = format!("verify c.tetdb --against scan.stl --embed post.obj {repair}");
+        place.run_line(&line).succeeds();
+    }
     let info = place.run_line("info a.tetdb").succeeds().stdout();
     let [closed, remeshed] = ["closed by", "remeshed ("].map(|words| info.find(words));
     assert!(closed.is_some() && closed < remeshed, "{info}");

@@ -8,7 +8,7 @@ use super::{Error, Event, Settings, Surface, Verification, VerifyLevel, job, ver
 use tetdb_base::storage::RunContext;
 use tetdb_schema::catalog::{InterfaceRow, RegionRow, StoreState, SubdomainRow};
 use tetdb_schema::labels::LabelSet;
-use tetdb_schema::source::Source;
+use tetdb_schema::source::{Origin, Source};
 use tetdb_store::audit::Level;
 use tetdb_store::query::QuerySession;
 use tetdb_store::sealed::Subdomain;
@@ -164,15 +164,23 @@ impl Store {
         })
     }
 
-    /// Repairs a surface as that of the store was repaired, if it was.
+    /// Repairs and remeshes a surface as that of the store was, if it was. One that is repaired already is remeshed alone.
     ///
     /// Errors: those of the repairs.
-    pub fn repaired_alike(&self, mut surface: Surface) -> Result<Surface, Error> {
+    pub fn repaired_alike(
+        &self,
+        mut surface: Surface,
+        is_repaired: bool,
+    ) -> Result<Surface, Error> {
         guarded_in(&self.context, || {
             let records = self.catalog.share().job()?.surfaces;
             let sources = records.iter().filter_map(Source::from_record);
             let scratch = self.settings.scratch_space(surface.inner.bytes() as u64)?;
-            for source in sources.filter(|s| s.origin.is_repair()) {
+            let is_left = |origin: &Origin| match origin {
+                Origin::Remeshed(_) => true,
+                origin => !is_repaired && origin.is_repair(),
+            };
+            for source in sources.filter(|s| is_left(&s.origin)) {
                 surface = surface.with_inside(&source.origin, &self.path, &scratch)?;
             }
             Ok(surface)

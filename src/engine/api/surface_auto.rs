@@ -14,7 +14,7 @@ use super::{
 };
 use tetdb_base::geom::{counted, short};
 use tetdb_base::storage::{ScratchSpace, attempt};
-use tetdb_base::surface::{self, closing, validate_with};
+use tetdb_base::surface::{self, Repair, closing, validate_with};
 use tetdb_repair::close::{CloseError, Watcher, close_bytes};
 use tetdb_schema::source::Source;
 
@@ -91,7 +91,7 @@ impl RepairStep {
                 let done = counts.into_iter().filter(|(n, _)| *n > 0);
                 done.map(|(n, what)| counted(n as u64, what)).collect::<Vec<_>>().join("; ")
             }
-            Self::Resolve(report) => report.in_words(),
+            Self::Resolve(report) => report.done.in_words(),
             Self::Winding(report) => report.in_words(),
             Self::Wrap(report) => report.in_words(),
         }
@@ -152,8 +152,7 @@ impl Surface {
         let weld = tried.last().filter(|t| t.closes && t.share <= WELD_SHARE_AUTO);
         if let Some(share) = weld.map(|t| t.share) {
             let report = self.welded_in(share, n_before);
-            if report.triangles_before != self.inner.n_triangles() || report.done.points_joined > 0
-            {
+            if report.done != Repair::default() {
                 steps.push(RepairStep::Weld(report));
             }
             if n_defects(&self)? == 0 {
@@ -162,7 +161,7 @@ impl Surface {
         }
         watch("resolve crossings", 0, 0);
         if let Ok((resolved, done)) = self.clone().resolved_in(scratch) {
-            let report = resolve_report(&resolved.inner, &done, scratch)?;
+            let report = resolve_report(&resolved.inner, done, scratch)?;
             // Where another rule fills more than parity, parts overlap, and parity would leave empty what they share.
             let is_enough = report.n_defects == 0 && report.regions.is_empty();
             if done.rounds > 0 || is_enough {
@@ -194,6 +193,9 @@ impl Surface {
     fn welded_in(&mut self, share: f64, n_defects_before: u64) -> RepairReport {
         let report = self.repair_in((share > 0.0).then_some(share), n_defects_before);
         let done = &report.done;
+        if *done == Repair::default() {
+            return report;
+        }
         self.record(Origin::Welded(format!(
             "share={share:e},joined={},dropped={},divided={},turned={}",
             done.points_joined,

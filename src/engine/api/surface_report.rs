@@ -157,6 +157,12 @@ impl<'a> SurfaceReport<'a> {
         self.tets_expected.map(|tets| n / tets)
     }
 
+    /// Whether the shapes of the triangles spoil many tetrahedra.
+    pub fn is_poorly_shaped(&self) -> bool {
+        self.fitness.small_angle_share > POOR_SHARE
+            || self.forced_share().is_some_and(|share| share > POOR_SHARE)
+    }
+
     /// Best quality possible for a tetrahedron on the worst triangle, and the centroid of this triangle.
     pub fn least_quality(&self) -> (f64, [f64; 3]) {
         let corners = self.surface.corners(self.fitness.worst_triangle);
@@ -168,7 +174,7 @@ impl<'a> SurfaceReport<'a> {
     pub fn advice(&self) -> Vec<String> {
         let f = &self.fitness;
         let mut advice = Vec::new();
-        if f.small_angle_share > POOR_SHARE || self.forced_share().is_some_and(|s| s > POOR_SHARE) {
+        if self.is_poorly_shaped() {
             let spoiled = match f.hopeless_triangles {
                 0 => String::new(),
                 n => format!(", {n} of them 10 or worse"),

@@ -8,7 +8,6 @@ use super::error::Error;
 use super::surface::refuse_sheets;
 use super::surface_repair::within;
 use super::{Settings, Surface, guarded};
-use tetdb_base::geom::{counted, short};
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface::{
     self, EnclosedVolumes, OUTSIDE, Seeker, VOLUMES_TRIANGLE, repair_bytes, show, validate_with,
@@ -20,57 +19,13 @@ use tetdb_repair::resolve::{ResolveError, Resolved, resolve};
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ResolveReport {
-    /// Pairs of triangles that touched where they should not.
-    pub pairs: u64,
-    /// Triangles divided; pieces that were divided again count again.
-    pub divided: usize,
-    /// Vertices added.
-    pub points_added: usize,
-    /// Rounds of dividing; 0 where nothing was to be done.
-    pub rounds: usize,
-    /// The longest distance in input units between a point of an intersection and its vertex.
-    pub moved_most: f64,
-    /// Triangles without area that were dropped.
-    pub collapsed_dropped: usize,
-    /// Triangles joined with one of the same vertices and direction, which has the labels of both.
-    pub merged: usize,
+    /// The counts.
+    #[serde(flatten)]
+    pub done: Resolved,
     /// Defects left, such as open edges.
     pub n_defects: u64,
     /// Rules that fill what overlapping parts fill together, if parity does not.
     pub regions: Vec<&'static str>,
-}
-
-impl ResolveReport {
-    pub(super) fn new(done: &Resolved, n_defects: u64, regions: Vec<&'static str>) -> Self {
-        Self {
-            pairs: done.pairs,
-            divided: done.divided,
-            points_added: done.points_added,
-            rounds: done.rounds,
-            moved_most: done.moved_most,
-            collapsed_dropped: done.collapsed,
-            merged: done.merged,
-            n_defects,
-            regions,
-        }
-    }
-
-    /// The counts in words.
-    pub fn in_words(&self) -> String {
-        let mut text = counted(self.pairs, "[pair|pairs] of triangles met where they should not; ");
-        text += &counted(self.divided as u64, "[triangle was|triangles were] divided, ");
-        text += &counted(self.points_added as u64, "[vertex was|vertices were] added");
-        text += &format!(", none farther than {} from its exact place", short(self.moved_most));
-        for (n, what) in [
-            (self.merged, "repeated [triangle was|triangles were] merged"),
-            (self.collapsed_dropped, "[triangle|triangles] without area [was|were] dropped"),
-        ] {
-            if n > 0 {
-                text += &format!(", {}", counted(n as u64, what));
-            }
-        }
-        text
-    }
 }
 
 impl Surface {
@@ -94,7 +49,7 @@ impl Surface {
         guarded(settings, || {
             let scratch = within(settings, &self.inner, repair_bytes(&self.inner))?;
             let (surface, done) = self.resolved_in(&scratch)?;
-            let report = report(&surface.inner, &done, &scratch)?;
+            let report = report(&surface.inner, done, &scratch)?;
             Ok((surface, report))
         })
     }
@@ -115,12 +70,12 @@ impl Surface {
 pub(super) fn tried(surface: &surface::Surface, scratch: &ScratchSpace) -> Option<ResolveReport> {
     let mut copy = surface.clone();
     let done = attempt(|| resolve(&mut copy, scratch)).ok()?.ok()?;
-    report(&copy, &done, scratch).ok()
+    report(&copy, done, scratch).ok()
 }
 
 pub(super) fn report(
     surface: &surface::Surface,
-    done: &Resolved,
+    done: Resolved,
     scratch: &ScratchSpace,
 ) -> Result<ResolveReport, Error> {
     let n_defects = attempt(|| validate_with(surface, scratch))?.n_defects;
@@ -129,7 +84,7 @@ pub(super) fn report(
         true => attempt(|| rules(surface, scratch))?,
         false => Vec::new(),
     };
-    Ok(ResolveReport::new(done, n_defects, regions))
+    Ok(ResolveReport { done, n_defects, regions })
 }
 
 /// Rules other than parity that fill more of the enclosed volumes.

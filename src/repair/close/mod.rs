@@ -23,7 +23,7 @@ mod tests;
 
 use std::collections::BTreeSet;
 
-use tetdb_base::geom::{Point, counted};
+use tetdb_base::geom::{Point, counted, short};
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{Defect, Surface, closedness, repair_bytes, validate_with};
 use tetdb_kernel::boundary::BoundaryError;
@@ -39,17 +39,20 @@ use winding::WindingTree;
 
 /// Places listed at most.
 const LISTED_MAX: usize = 16;
+/// Holes listed in words.
+const LISTED: usize = 3;
 
-/// Result of [`close`].
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Closed {
-    /// What was done to crossings before.
-    pub resolved: Resolved,
+/// What [`close`] did. Serialized, it is the key `winding` of `tetdb check --json`.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct CloseReport {
     /// Holes that were closed, the largest first.
     pub holes: Vec<ClosedHole>,
+    /// Area of all of them.
+    pub hole_area: f64,
     /// Triangles added, which close the holes.
     pub triangles_added: usize,
-    /// Vertices added inside holes; those of divided triangles are counted by `resolved`.
+    /// Vertices added inside holes; those of divided triangles are counted by `resolve`.
     pub points_added: usize,
     /// Triangles turned outward.
     pub turned: usize,
@@ -59,18 +62,55 @@ pub struct Closed {
     pub dropped_outside: usize,
     /// Triangles dropped that another one gives from the other side.
     pub dropped_repeated: usize,
-    /// Volume weighted with the winding number.
+    /// Volume weighted with the winding number of the given surface.
     pub volume_by_winding: f64,
     /// Volume enclosed now.
     pub volume: f64,
-    /// Volume with a winding number between 0.3 and 0.7: there the choice is open to doubt.
+    /// Volume with a winding number between 0.3 and 0.7, where the choice is open to doubt.
     pub volume_doubtful: f64,
+    /// What was done to crossings first.
+    pub resolve: Resolved,
 }
 
-impl Closed {
-    /// Area of all holes.
-    pub fn hole_area(&self) -> f64 {
-        self.holes.iter().map(|hole| hole.area).sum()
+impl CloseReport {
+    /// The counts in words.
+    pub fn in_words(&self) -> String {
+        let mut text = match self.holes.len() as u64 {
+            0 => "no hole was to be closed".to_owned(),
+            n => {
+                let new = counted(self.triangles_added as u64, "[triangle|triangles]");
+                let area = short(self.hole_area);
+                format!("{}, with {new} of area {area}", counted(n, "[hole was|holes were] closed"))
+            }
+        };
+        if !self.holes.is_empty() {
+            let named = |hole: &ClosedHole| {
+                let [area, length] = [hole.area, hole.boundary].map(short);
+                format!("{} of area {area} in a boundary of {length}", hole.label)
+            };
+            let listed: Vec<String> = self.holes.iter().take(LISTED).map(named).collect();
+            let rest = if self.holes.len() > LISTED { ", …" } else { "" };
+            text += &format!(" ({}{rest})", listed.join(", "));
+        }
+        for (n, what) in [
+            (self.points_added, "[vertex was|vertices were] added in them"),
+            (self.turned, "[triangle was|triangles were] turned outward"),
+            (self.dropped_inside, "[triangle|triangles] inside [was|were] dropped"),
+            (self.dropped_outside, "[triangle|triangles] outside [was|were] dropped"),
+            (self.dropped_repeated, "repeated [triangle was|triangles were] dropped"),
+        ] {
+            if n > 0 {
+                text += &format!("; {}", counted(n as u64, what));
+            }
+        }
+        text += &format!("; the volume is {}", short(self.volume));
+        if self.volume_doubtful > 1e-9 * self.volume {
+            text += &format!(", and {} of space is open to doubt", short(self.volume_doubtful));
+        }
+        if self.resolve.rounds > 0 {
+            text += &format!("; before that, {}", self.resolve.in_words());
+        }
+        text
     }
 }
 
@@ -138,10 +178,10 @@ pub fn close(
     surface: &mut Surface,
     scratch: &ScratchSpace,
     watch: &Watcher,
-) -> Result<Closed, CloseError> {
+) -> Result<CloseReport, CloseError> {
     watch("resolve crossings", 0, 0);
     let shells_turned = turn_shells(surface);
-    let resolved = resolve(surface, scratch)?;
+    let resolve = resolve(surface, scratch)?;
     if surface.n_triangles() == 0 {
         return Err(CloseError::NothingInside);
     }
@@ -159,8 +199,10 @@ pub fn close(
         let places = found.defects.iter().filter_map(Defect::at).take(LISTED_MAX).collect();
         return Err(CloseError::Unsound { n: found.n_defects, places });
     }
-    Ok(Closed {
-        resolved,
+    Ok(CloseReport {
+        resolve,
+        // The sum of nothing is -0.
+        hole_area: holes.iter().map(|hole| hole.area).sum::<f64>() + 0.0,
         triangles_added: holes.iter().map(|hole| hole.triangles).sum(),
         holes,
         points_added,

@@ -28,7 +28,7 @@ use arrangement::Arrangement;
 use exact::ExactPoint;
 use meeting::{Meeting, clipped, meeting};
 use near::NearVertices;
-use tetdb_base::geom::Point;
+use tetdb_base::geom::{Point, counted, short};
 use tetdb_base::storage::{ScratchSpace, check_cancelled, parallel};
 use tetdb_base::surface::{
     Contact, Merged, PAIRS_MAX, Surface, drop_folds, drop_unused_points, merge_repeated,
@@ -48,8 +48,8 @@ const AT_ONCE: usize = 1 << 12;
 /// Places listed at most.
 const LISTED_MAX: usize = 16;
 
-/// Result of [`resolve`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What [`resolve`] did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Resolved {
     /// Pairs of triangles that touched where they should not, before anything was divided.
     pub pairs: u64,
@@ -62,7 +62,7 @@ pub struct Resolved {
     /// The longest distance, in input units, between a point of an intersection and the vertex it became.
     pub moved_most: f64,
     /// Triangles without area that were dropped, folds of rounding among them.
-    pub collapsed: usize,
+    pub collapsed_dropped: usize,
     /// Triangles that were joined with one of the same vertices and direction, which is in the groups of both.
     pub merged: usize,
 }
@@ -100,7 +100,7 @@ pub fn resolve(surface: &mut Surface, scratch: &ScratchSpace) -> Result<Resolved
     loop {
         done.merge(surface);
         if done.rounds > 0 {
-            done.collapsed += drop_folds(surface, FOLD_SHARE * surface.bounds().diagonal());
+            done.collapsed_dropped += drop_folds(surface, FOLD_SHARE * surface.bounds().diagonal());
         }
         check_cancelled();
         let pairs = pairs_that_touch(surface, scratch).ok_or(ResolveError::TooMany)?;
@@ -122,9 +122,26 @@ pub fn resolve(surface: &mut Surface, scratch: &ScratchSpace) -> Result<Resolved
 }
 
 impl Resolved {
+    /// The counts in words.
+    pub fn in_words(&self) -> String {
+        let mut text = counted(self.pairs, "[pair|pairs] of triangles met where they should not; ");
+        text += &counted(self.divided as u64, "[triangle was|triangles were] divided, ");
+        text += &counted(self.points_added as u64, "[vertex was|vertices were] added");
+        text += &format!(", none farther than {} from its exact place", short(self.moved_most));
+        for (n, what) in [
+            (self.merged, "repeated [triangle was|triangles were] merged"),
+            (self.collapsed_dropped, "[triangle|triangles] without area [was|were] dropped"),
+        ] {
+            if n > 0 {
+                text += &format!(", {}", counted(n as u64, what));
+            }
+        }
+        text
+    }
+
     fn merge(&mut self, surface: &mut Surface) {
         let Merged { collapsed, repeated } = merge_repeated(surface);
-        self.collapsed += collapsed;
+        self.collapsed_dropped += collapsed;
         self.merged += repeated;
     }
 }

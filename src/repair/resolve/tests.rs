@@ -215,7 +215,10 @@ fn triangles_without_area_and_repeated_ones_are_merged() {
     all.extend([("x", [a, b, c]), ("y", [b, c, a]), ("x", [c, a, b]), ("flat", [a, d, b])]);
     let mut after = surface(&all);
     let done = resolve(&mut after, &ScratchSpace::boundless()).expect("it settles");
-    assert_eq!((done.collapsed, done.merged, done.rounds, after.n_triangles()), (1, 2, 0, 13));
+    assert_eq!(
+        (done.collapsed_dropped, done.merged, done.rounds, after.n_triangles()),
+        (1, 2, 0, 13)
+    );
     assert_eq!(after.label_name(12), "x+y");
     assert_eq!(after.n_vertices(), 11);
 }

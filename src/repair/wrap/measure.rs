@@ -12,6 +12,8 @@ use super::oracle::Oracle;
 
 /// Items of one task.
 const BLOCK: usize = 1 << 12;
+/// Of fewer triangles than this, samples are nearer to each other, down to a tenth: a soup of ten triangles has few points else.
+const MANY: f64 = 1e4;
 /// A triangle is sampled with at most this many points along a side.
 const SAMPLES_MAX: f64 = 32.0;
 
@@ -126,6 +128,7 @@ pub fn distances(
     apart: f64,
     oracle: &Oracle,
 ) -> (Distances, Vec<u32>) {
+    let apart = apart * (n as f64 / MANY).sqrt().clamp(0.1, 1.0);
     let starts: Vec<usize> = (0..n).step_by(BLOCK).collect();
     let blocks: Vec<(Distances, Vec<u32>)> = parallel(|| {
         let block = |&start: &usize| {

@@ -24,8 +24,10 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-use tetdb_base::geom::{Aabb, IdMap, Point};
-use tetdb_base::storage::{ScratchSpace, check_cancelled};
+use rayon::prelude::*;
+
+use tetdb_base::geom::{Aabb, HilbertFrame, IdMap, Point};
+use tetdb_base::storage::{ScratchSpace, check_cancelled, parallel};
 use tetdb_base::surface::Surface;
 
 use delaunay::N_FAR;
@@ -198,7 +200,10 @@ fn left_out(flood: &Flood, parts: &Parts) -> Option<Point> {
         parts.part(t).0.iter().for_each(|&v| is_used[v as usize] = true);
     }
     let used = parts.surface.points.iter().zip(is_used).filter(|(_, used)| *used);
-    let points: Vec<Point> = used.map(|(p, _)| *p).collect();
+    let mut points: Vec<Point> = used.map(|(p, _)| *p).collect();
+    // Each is sought from the place of the one before.
+    let frame = HilbertFrame::new(&Aabb::around(points.iter().copied()));
+    parallel(|| points.par_sort_by_cached_key(|p| frame.index(*p)));
     measure::left_out(flood, &points).map(|k| points[k])
 }
 
