@@ -92,8 +92,13 @@ impl ScratchSpace {
 
     /// A sorter with a quarter of the free bytes.
     pub fn sorter<R: SortRecord>(&self) -> Sorter<R> {
+        self.sorter_within(self.available() / 4)
+    }
+
+    /// A sorter with so many bytes, which are not leased.
+    pub fn sorter_within<R: SortRecord>(&self, bytes: u64) -> Sorter<R> {
         match &self.dir {
-            Some(dir) => Sorter::new(dir, self.available() / 4),
+            Some(dir) => Sorter::new(dir, bytes),
             None => Sorter::new("", u64::MAX),
         }
     }

@@ -1,0 +1,311 @@
+//! First steps of an import: vertices along the Hilbert curve, checked tetrahedra, their sub-domains.
+
+use std::collections::HashMap;
+
+use super::BadMesh;
+use super::faces::{Kept, match_faces};
+use super::planes::{Planes, SAMPLE_MAX};
+use super::records::{PartTet, SharedVertex};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::TETS_PER_SUBDOMAIN;
+use crate::pipeline::progress::{Event, Watcher};
+use tetdb_base::geom::{Aabb, HilbertFrame, Point, counted, orient};
+use tetdb_base::storage::{KeyedId, ScratchSpace, Sorter, SpillVec, check_cancelled, map_into};
+use tetdb_base::surface::Surface;
+use tetdb_io::read::{Groups, RawMesh};
+use tetdb_schema::ids::SubdomainId;
+use tetdb_schema::page::NONE;
+
+/// Tetrahedra processed at once.
+pub const AT_ONCE: usize = 1 << 15;
+/// Regions keep the numbers of the file up to this one: each number has a row in the catalog.
+const REGION_MAX: i64 = 1 << 16;
+const TURNED_HELP: &str = "write the mesh with corners in one order throughout; each first face must turn the same way seen from the fourth corner";
+const FLAT_HELP: &str = "remove flat tetrahedra, or mesh again";
+
+/// A checked mesh, ready to be written.
+pub struct Placed {
+    /// Box of all vertices.
+    pub bounds: Aabb,
+    /// Number of sub-domains.
+    pub n_parts: u32,
+    /// Boundary, faces between regions, and the file's triangles.
+    pub surface: Surface,
+    /// Number and name of each region.
+    pub regions: Vec<(u32, String)>,
+    /// What was left out or changed.
+    pub notes: Vec<String>,
+    pub(super) points: SpillVec<[f64; 3]>,
+    /// Four vertices, region, sub-domain.
+    pub(super) tets: SpillVec<[u32; 6]>,
+    pub(super) order: Sorter<PartTet>,
+    /// The first sub-domain of each vertex.
+    pub(super) first_part: SpillVec<u32>,
+    pub(super) shared: Sorter<SharedVertex>,
+    /// Number in the surface of each vertex, or [`NONE`].
+    pub(super) on_surface: SpillVec<u32>,
+    pub(super) kept: SpillVec<Kept>,
+}
+
+/// Checks a mesh and places its tetrahedra in `parts` sub-domains: those of the file if it has any, else so many or as fits its size.
+///
+/// Errors: a mesh without tetrahedra, with a repeated, flat or turned tetrahedron, or one that does not conform. Unwinds where the disk
+/// fails.
+pub fn place(
+    mesh: RawMesh,
+    parts: Option<u32>,
+    space: &ScratchSpace,
+    watch: &Watcher,
+) -> Result<Placed, PipelineError> {
+    let RawMesh { stem, points, tets, triangles, regions, labels, parts: groups, notes, .. } = mesh;
+    let (mut raw_points, mut raw_tets) = (points.finish(), tets.finish());
+    if raw_tets.is_empty() {
+        let what = "the file holds no tetrahedra";
+        let help = "give a file with a volume mesh; `mesh` takes a surface";
+        return Err(BadMesh::new(what, help).into());
+    }
+    let mut notes = notes;
+    let vertices = renumber(&mut raw_points, &mut raw_tets, space, &mut notes)?;
+    drop(raw_points);
+    let (region_rank, regions) = region_numbers(&regions);
+    let mut placing =
+        Placing { vertices, parts_of: Parts::new(parts, &groups, &raw_tets)?, region_rank };
+    let tets = placing.check(&mut raw_tets, space, watch, &mut notes)?;
+    drop(raw_tets);
+    let Placing { vertices, parts_of, .. } = placing;
+    let file = FileTriangles { triangles: triangles.finish(), labels, stem };
+    match_faces(vertices, tets, parts_of, file, regions, notes, space, watch)
+}
+
+/// Triangles of the file.
+pub struct FileTriangles {
+    pub triangles: SpillVec<[u32; 4]>,
+    pub labels: Groups,
+    pub stem: String,
+}
+
+/// Vertices in their new order.
+pub struct Vertices {
+    pub points: SpillVec<[f64; 3]>,
+    /// From the file's vertices; [`NONE`] for one that no tetrahedron has.
+    pub new_of: SpillVec<u32>,
+    pub bounds: Aabb,
+}
+
+fn renumber(
+    raw: &mut SpillVec<[f64; 3]>,
+    tets: &mut SpillVec<[u32; 6]>,
+    space: &ScratchSpace,
+    notes: &mut Vec<String>,
+) -> Result<Vertices, PipelineError> {
+    let n = raw.len();
+    let mut new_of = space.vec(n, NONE);
+    for t in 0..tets.len() {
+        let [corners @ .., _, _] = tets.get(t);
+        if let Some(v) = corners.into_iter().find(|&v| v as usize >= n) {
+            let what =
+                format!("a tetrahedron names vertex {}, and there are {n}", u64::from(v) + 1);
+            let help = "write the file again from the program it comes from";
+            return Err(BadMesh::new(what, help).at("tetrahedron", t as u64, &[]).into());
+        }
+        corners.into_iter().for_each(|v| new_of.set(v as usize, 0));
+    }
+    check_cancelled();
+    let mut bounds = Aabb::EMPTY;
+    for v in 0..n {
+        if new_of.get(v) != NONE {
+            bounds = bounds.with(Point::from_array(raw.get(v)));
+        }
+    }
+    let frame = HilbertFrame::new(&bounds);
+    let mut sorter = space.sorter_within(space.cap() / 4);
+    for v in 0..n {
+        if new_of.get(v) != NONE {
+            sorter
+                .push(KeyedId { key: frame.index(Point::from_array(raw.get(v))), id: v as u32 })?;
+        }
+    }
+    let mut points = space.builder_within(space.available() / 4);
+    let (mut n_used, mut last_key) = (0, None);
+    // Vertices of one place of the curve by their coordinates.
+    let mut alike: HashMap<[u64; 3], u32> = HashMap::new();
+    for record in sorter.finish()? {
+        let KeyedId { key, id } = record?;
+        n_used += 1;
+        let p = raw.get(id as usize);
+        if last_key != Some(key) {
+            alike.clear();
+            last_key = Some(key);
+        }
+        let new = *alike.entry(p.map(f64::to_bits)).or_insert_with(|| {
+            points.push(p);
+            points.len() as u32 - 1
+        });
+        new_of.set(id as usize, new);
+    }
+    for (k, text) in [
+        (n - n_used, "[vertex belongs|vertices belong] to no tetrahedron and [was|were] left out"),
+        (
+            n_used - points.len(),
+            "[vertex repeats|vertices repeat] the coordinates of another and [was|were] joined to it",
+        ),
+    ] {
+        if k > 0 {
+            notes.push(counted(k as u64, text));
+        }
+    }
+    Ok(Vertices { points: points.finish(), new_of, bounds })
+}
+
+/// The new number of each group, and number and name of each region. Numbers of the file are kept if they can be.
+fn region_numbers(groups: &Groups) -> (Vec<u32>, Vec<(u32, String)>) {
+    let mut order: Vec<usize> = (0..groups.list.len()).collect();
+    order.sort_by_key(|&g| groups.list[g].0);
+    let keeps = groups.list.iter().all(|group| (1..REGION_MAX).contains(&group.0));
+    let mut rank = vec![1; groups.list.len()];
+    let mut regions = Vec::new();
+    for (k, &g) in (1..).zip(&order) {
+        let (number, name) = &groups.list[g];
+        rank[g] = if keeps { *number as u32 } else { k };
+        let is_new = i64::from(rank[g]) != *number && *number != 0;
+        let name = match name.is_empty() && is_new {
+            true => format!("region_{number}"),
+            false => name.clone(),
+        };
+        regions.push((rank[g], name));
+    }
+    if regions.is_empty() {
+        regions.push((1, String::new()));
+    }
+    (rank, regions)
+}
+
+/// Where the sub-domain of a tetrahedron comes from.
+pub enum Parts {
+    /// The rank of each part of the file.
+    OfFile(Vec<u32>),
+    /// Planes for so many sub-domains, once there is a sample.
+    Planes(u32, Option<Planes>),
+}
+
+impl Parts {
+    fn new(n: Option<u32>, groups: &Groups, tets: &SpillVec<[u32; 6]>) -> Result<Self, BadMesh> {
+        let n_tets = tets.len() as u64;
+        let found = match groups.list.len() {
+            0 => {
+                let auto = (n_tets as f64 / TETS_PER_SUBDOMAIN).ceil() as u32;
+                let most = n_tets.min(SAMPLE_MAX) as u32;
+                return Ok(Self::Planes(n.unwrap_or(auto).clamp(1, most), None));
+            }
+            found => found,
+        };
+        if found > SubdomainId::COUNT_MAX as usize {
+            let what = format!("the mesh has {found} parts, more than there can be sub-domains");
+            return Err(BadMesh::new(what, "give an array with fewer values for the parts"));
+        }
+        let mut order: Vec<usize> = (0..found).collect();
+        order.sort_by_key(|&g| groups.list[g].0);
+        let mut rank = vec![0; found];
+        (0..).zip(order).for_each(|(k, g)| rank[g] = k);
+        Ok(Self::OfFile(rank))
+    }
+
+    pub fn count(&self) -> u32 {
+        match self {
+            Self::OfFile(ranks) => ranks.len() as u32,
+            Self::Planes(n, _) => *n,
+        }
+    }
+
+    /// The sub-domain of a tetrahedron with this part of the file and these corners.
+    pub fn of(&self, group: u32, corners: &[Point; 4]) -> u32 {
+        match self {
+            Self::OfFile(ranks) => ranks[group as usize],
+            Self::Planes(_, planes) => planes.as_ref().map_or(0, |p| p.part(middle(corners))),
+        }
+    }
+}
+
+fn middle(corners: &[Point; 4]) -> Point {
+    corners.iter().sum::<Point>() / 4.0
+}
+
+struct Placing {
+    vertices: Vertices,
+    parts_of: Parts,
+    region_rank: Vec<u32>,
+}
+
+impl Placing {
+    /// Renumbers and checks all tetrahedra, and chooses the planes. If all are negative, they are turned.
+    fn check(
+        &mut self,
+        raw: &mut SpillVec<[u32; 6]>,
+        space: &ScratchSpace,
+        watch: &Watcher,
+        notes: &mut Vec<String>,
+    ) -> Result<SpillVec<[u32; 6]>, PipelineError> {
+        let n = raw.len();
+        let mut tets = space.builder_within(space.available() / 4);
+        let stride = (n as u64).div_ceil(SAMPLE_MAX) as usize;
+        let mut sample = Vec::new();
+        let (mut corners, mut signs) = (Vec::new(), Vec::new());
+        let mut flat = BadMesh::new("a tetrahedron has no volume", FLAT_HELP);
+        let what = "some tetrahedra are turned inside out, others are not";
+        let (mut negative, mut first) = (BadMesh::new(what, TURNED_HELP), true);
+        for from in (0..n).step_by(AT_ONCE) {
+            check_cancelled();
+            let done = from as u64;
+            watch(Event {
+                stage: "check tetrahedra",
+                done,
+                total: Some(n as u64),
+                unit: "tetrahedra",
+            });
+            corners.clear();
+            for t in from..n.min(from + AT_ONCE) {
+                let [a, b, c, d, region, part] = raw.get(t);
+                let nodes = [a, b, c, d].map(|v| self.vertices.new_of.get(v as usize));
+                let four = nodes.map(|v| Point::from_array(self.vertices.points.get(v as usize)));
+                if (1..4).any(|i| nodes[..i].contains(&nodes[i])) {
+                    let what = "a tetrahedron has one vertex twice, or two at one place";
+                    return Err(BadMesh::new(what, FLAT_HELP)
+                        .at("tetrahedron", t as u64, &four)
+                        .into());
+                }
+                let [a, b, c, d] = nodes;
+                let region = self.region_rank.get(region as usize).copied().unwrap_or(1);
+                tets.push([a, b, c, d, region, part]);
+                if t % stride == 0 {
+                    sample.push(middle(&four));
+                }
+                corners.push(four);
+            }
+            map_into(&corners, &mut signs, |&[a, b, c, d]| orient(a, b, c, d));
+            for (t, (sign, four)) in (from as u64..).zip(signs.iter().zip(&corners)) {
+                match sign.total_cmp(&0.0) {
+                    _ if *sign == 0.0 => flat.add("tetrahedron", t, four),
+                    std::cmp::Ordering::Less => negative.add("tetrahedron", t, four),
+                    _ => first = false,
+                }
+            }
+        }
+        if flat.n > 0 {
+            return Err(flat.into());
+        }
+        if negative.n > 0 && !first {
+            return Err(negative.into());
+        }
+        let mut tets = tets.finish();
+        if negative.n > 0 {
+            for t in 0..n {
+                tets.change(t, |tet| tet.swap(0, 1));
+            }
+            notes.push("all tetrahedra were turned inside out; they were turned back".to_owned());
+        }
+        if let Parts::Planes(n, planes) = &mut self.parts_of {
+            *planes = Some(Planes::new(*n, &mut sample));
+        }
+        Ok(tets)
+    }
+}
