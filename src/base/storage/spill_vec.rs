@@ -206,6 +206,22 @@ impl<T: Pod> SpillVecBuilder<T> {
         self.memory.push(value);
     }
 
+    /// Element `i`.
+    pub fn get(&mut self, i: usize) -> T {
+        match &mut self.paged {
+            Some(paged) => *paged.at(i),
+            None => self.memory[i],
+        }
+    }
+
+    /// Sets element `i` to `value`.
+    pub fn set(&mut self, i: usize, value: T) {
+        match &mut self.paged {
+            Some(paged) => *paged.at_mut(i) = value,
+            None => self.memory[i] = value,
+        }
+    }
+
     /// Number of elements.
     pub fn len(&self) -> usize {
         match &self.paged {

@@ -12,7 +12,7 @@ use super::{
 use crate::pipeline::{self, MeshOptions, PipelineError};
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface;
-use tetdb_io::read::{MeshFields, RawMesh, read_tets};
+use tetdb_io::read::{MeshFields, RawMesh, read_tets, tets_file};
 use tetdb_schema::code::Code;
 use tetdb_schema::source::{Origin, Source};
 use tetdb_store::store::{Catalog, StoreError};
@@ -163,7 +163,11 @@ impl Import {
 
     /// The file as the store records it.
     fn origin(&self) -> Result<Source, Error> {
-        let of = source(&self.file)?;
+        let is_array = self.file.extension().is_some_and(|ending| ending == "npy");
+        let of = match is_array {
+            true => source(&tets_file(&self.file))?,
+            false => source(&self.file)?,
+        };
         let file = of.origin.file().unwrap_or_default().to_owned();
         Ok(Source { origin: Origin::Imported(file), ..of })
     }

@@ -92,10 +92,13 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     fn read_element_2(&mut self, kind: i64, n_tags: i64) -> Result<()> {
         let n_tags = self.numbers.check_count("element tags", n_tags, 1, 4)?;
         let mut group = 0;
+        self.partition = 0;
         for i in 0..n_tags {
             let tag = self.numbers.int()?;
-            if i == 0 {
-                group = tag;
+            match i {
+                0 => group = tag,
+                3 => self.partition = tag,
+                _ => {}
             }
         }
         let kind = need_element_type(kind, &self.numbers.feed)?;

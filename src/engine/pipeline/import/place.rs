@@ -1,6 +1,6 @@
 //! First steps of an import: vertices along the Hilbert curve, checked tetrahedra, their sub-domains.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use super::BadMesh;
 use super::faces::{Kept, match_faces};
@@ -65,9 +65,9 @@ pub fn place(
         return Err(BadMesh::new(what, help).into());
     }
     let mut notes = notes;
-    let vertices = renumber(&mut raw_points, &mut raw_tets, space, &mut notes)?;
+    let (vertices, used) = renumber(&mut raw_points, &mut raw_tets, space, &mut notes)?;
     drop(raw_points);
-    let (region_rank, regions) = region_numbers(&regions);
+    let (region_rank, regions) = region_numbers(&regions, &used);
     let mut placing =
         Placing { vertices, parts_of: Parts::new(parts, &groups, &raw_tets)?, region_rank };
     let tets = placing.check(&mut raw_tets, space, watch, &mut notes)?;
@@ -97,11 +97,13 @@ fn renumber(
     tets: &mut SpillVec<[u32; 6]>,
     space: &ScratchSpace,
     notes: &mut Vec<String>,
-) -> Result<Vertices, PipelineError> {
+) -> Result<(Vertices, BTreeSet<u32>), PipelineError> {
     let n = raw.len();
     let mut new_of = space.vec(n, NONE);
+    let mut regions = BTreeSet::new();
     for t in 0..tets.len() {
-        let [corners @ .., _, _] = tets.get(t);
+        let [corners @ .., region, _] = tets.get(t);
+        regions.insert(region);
         if let Some(v) = corners.into_iter().find(|&v| v as usize >= n) {
             let what =
                 format!("a tetrahedron names vertex {}, and there are {n}", u64::from(v) + 1);
@@ -154,28 +156,28 @@ fn renumber(
             notes.push(counted(k as u64, text));
         }
     }
-    Ok(Vertices { points: points.finish(), new_of, bounds })
+    Ok((Vertices { points: points.finish(), new_of, bounds }, regions))
 }
 
 /// The new number of each group, and number and name of each region. Numbers of the file are kept if they can be.
-fn region_numbers(groups: &Groups) -> (Vec<u32>, Vec<(u32, String)>) {
-    let mut order: Vec<usize> = (0..groups.list.len()).collect();
-    order.sort_by_key(|&g| groups.list[g].0);
-    let keeps = groups.list.iter().all(|group| (1..REGION_MAX).contains(&group.0));
-    let mut rank = vec![1; groups.list.len()];
+fn region_numbers(groups: &Groups, used: &BTreeSet<u32>) -> (Vec<u32>, Vec<(u32, String)>) {
+    let none = (0, String::new());
+    let group = |g: u32| groups.list.get(g as usize).unwrap_or(&none);
+    let mut order: Vec<u32> = used.iter().copied().collect();
+    order.sort_by_key(|&g| group(g).0);
+    let keeps = order.iter().all(|&g| (1..REGION_MAX).contains(&group(g).0));
+    let mut rank = vec![0; used.last().map_or(0, |last| *last as usize + 1)];
     let mut regions = Vec::new();
-    for (k, &g) in (1..).zip(&order) {
-        let (number, name) = &groups.list[g];
-        rank[g] = if keeps { *number as u32 } else { k };
-        let is_new = i64::from(rank[g]) != *number && *number != 0;
-        let name = match name.is_empty() && is_new {
-            true => format!("region_{number}"),
-            false => name.clone(),
+    for (k, g) in (1..).zip(order) {
+        let (number, name) = group(g);
+        let region = if keeps { *number as u32 } else { k };
+        rank[g as usize] = region;
+        let default = format!("region_{region}");
+        let name = match name.as_str() {
+            "" if *number != 0 => format!("region_{number}"),
+            name => name.to_owned(),
         };
-        regions.push((rank[g], name));
-    }
-    if regions.is_empty() {
-        regions.push((1, String::new()));
+        regions.push((region, if name == default { String::new() } else { name }));
     }
     (rank, regions)
 }
@@ -274,7 +276,7 @@ impl Placing {
                         .into());
                 }
                 let [a, b, c, d] = nodes;
-                let region = self.region_rank.get(region as usize).copied().unwrap_or(1);
+                let region = self.region_rank[region as usize];
                 tets.push([a, b, c, d, region, part]);
                 if t % stride == 0 {
                     sample.push(middle(&four));

@@ -74,7 +74,8 @@ fn tets<const N: usize, R: BufRead>(
         numbers.feed.need_record("tetrahedra", n, i)?;
         let corners = numbers.corners::<N>(n_vertices)?;
         let region = mesh.regions.number(numbers.integer("a reference")?);
-        mesh.tet(std::array::from_fn(|k| corners[k]), region, 0, &numbers.feed)?;
+        let taken = mesh.tet(std::array::from_fn(|k| corners[k]), region, 0);
+        taken.map_err(|fault| numbers.feed.refuse(fault))?;
     }
     Ok(())
 }

@@ -9,6 +9,8 @@ use tetdb_base::storage::{ScratchSpace, SpillVec, SpillVecBuilder};
 
 /// Most tetrahedra of a mesh: four faces of each have 32-bit numbers.
 const TETS_MAX: usize = 1 << 30;
+/// Groups without a number have this one or higher ones.
+const UNNUMBERED: i64 = 1 << 40;
 /// Node numbers may be this many times as far apart as there are nodes. Beyond it, a table of the numbers would be mostly empty.
 const SPARSE_MAX: u64 = 64;
 
@@ -66,12 +68,14 @@ impl Groups {
         id
     }
 
-    /// The position of the group of this name, which is added if new.
+    /// The position of the group of this name, which is added if new. `region_12` has number 12, others come behind all numbers.
     pub fn named(&mut self, name: &str) -> u32 {
-        match self.list.iter().position(|group| group.1 == name) {
-            Some(id) => id as u32,
-            None => self.with_name(self.list.len() as i64 + 1, || name.to_owned()),
+        if let Some(id) = self.list.iter().position(|group| group.1 == name) {
+            return id as u32;
         }
+        let number = name.strip_prefix("region_").and_then(|n| n.parse().ok());
+        let number = number.filter(|n| !self.ids.contains_key(n) && *n < UNNUMBERED);
+        self.with_name(number.unwrap_or(UNNUMBERED + self.list.len() as i64), || name.to_owned())
     }
 }
 
@@ -101,15 +105,15 @@ impl RawMesh {
 
     /// Adds a tetrahedron. Errors: there are too many.
     #[inline]
-    pub fn tet<R: BufRead>(
+    pub(super) fn tet(
         &mut self,
         [a, b, c, d]: [u32; 4],
         region: u32,
         part: u32,
-        feed: &Feed<R>,
-    ) -> Result<()> {
+    ) -> std::result::Result<(), ReadFault> {
         if self.tets.len() >= TETS_MAX {
-            return Err(feed.unsupported(format!("a mesh of more than {TETS_MAX} tetrahedra")));
+            let what = format!("a mesh of more than {TETS_MAX} tetrahedra");
+            return Err(ReadFault::Unsupported(what));
         }
         self.tets.push([a, b, c, d, region, part]);
         Ok(())
