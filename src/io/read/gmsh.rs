@@ -225,6 +225,9 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 (b"$Elements", V2) => self.read_elements_2_text("$EndElements")?,
                 (b"$Elements", _) => self.read_elements_4()?,
                 _ => {
+                    if let Some(tets) = &mut self.tets {
+                        tets.skip(&section);
+                    }
                     let end: &[u8] = if self.version == V1 { b"$END" } else { b"$End" };
                     self.numbers.feed.skip_past(&[end, &section[1..]].concat())?;
                 }

@@ -38,8 +38,6 @@ pub fn match_faces(
     tets: SpillVec<[u32; 6]>,
     parts_of: Parts,
     mut file: FileTriangles,
-    regions: Vec<(u32, String)>,
-    mut notes: Vec<String>,
     space: &ScratchSpace,
     watch: &Watcher,
 ) -> Result<Placed, PipelineError> {
@@ -57,15 +55,15 @@ pub fn match_faces(
     };
     let n_stray = matching.take_triangles(&mut file)?;
     matching.take_tets(watch)?;
-    let kept = matching.keep(&file, n_stray, &mut notes)?;
+    let kept = matching.keep(&mut file, n_stray)?;
     let Matching { vertices, tets, parts_of, order, first_part, shared, .. } = matching;
     let KeptFaces { kept, on_surface, surface } = kept;
     Ok(Placed {
         bounds: vertices.bounds,
         n_parts: parts_of.count(),
         surface,
-        regions,
-        notes,
+        regions: file.regions,
+        notes: file.notes,
         points: vertices.points,
         tets,
         order,
@@ -177,9 +175,8 @@ impl Matching<'_> {
     /// Reads the sorted sides face by face, and keeps the faces on the boundary, between regions or sub-domains, and of the file.
     fn keep(
         &mut self,
-        file: &FileTriangles,
+        file: &mut FileTriangles,
         mut n_stray: u64,
-        notes: &mut Vec<String>,
     ) -> Result<KeptFaces, PipelineError> {
         let empty = self.space.sorter_within(0);
         let mut sides = std::mem::replace(&mut self.sides, empty).finish()?.peekable();
@@ -213,36 +210,18 @@ impl Matching<'_> {
                 [even, odd] if even.odd != odd.odd => [even.of, odd.of],
                 [.., last] => return Err(self.crowded(first.face, last.of >> 2)),
             };
-            let [_, _, _, _, region, part] = self.tets.get(behind as usize >> 2);
-            let (is_wall, is_interface) = match front {
-                NONE => (true, false),
-                front => {
-                    let [_, _, _, _, region_b, part_b] = self.tets.get(front as usize >> 2);
-                    (region != region_b, part != part_b)
-                }
-            };
+            let front = if front == NONE { NONE } else { front >> 2 };
+            let (is_wall, is_interface) = self.role(behind >> 2, front);
             let is_surface = is_wall || !labels.is_empty();
             if !is_surface && !is_interface {
                 continue;
             }
             let [a, b, c, d, ..] = self.tets.get(behind as usize >> 2);
             let face = FACES[behind as usize & 3].map(|k| [a, b, c, d][k]);
-            let front = if front == NONE { NONE } else { front >> 2 };
             let mut triangle = NONE;
             if is_surface {
                 triangle = builder.n_file_triangles() as u32;
-                let mut corners = [0; 3];
-                for (corner, v) in corners.iter_mut().zip(face) {
-                    *corner = match on_surface.get(v as usize) {
-                        NONE => {
-                            let number = builder.n_file_vertices() as u32;
-                            builder.vertex(self.point(v))?;
-                            on_surface.set(v as usize, number);
-                            number
-                        }
-                        known => known,
-                    };
-                }
+                let corners = self.on_surface(face, &mut builder, &mut on_surface)?;
                 let label = label_of(&mut builder, &mut labels, file);
                 builder.triangle(corners, label)?;
             }
@@ -250,13 +229,39 @@ impl Matching<'_> {
             kept.push([a, b, c, behind >> 2, front, triangle]);
         }
         if n_stray > 0 {
-            notes.push(counted(
-                n_stray,
-                "[triangle is no face of a tetrahedron and was|triangles are no faces of tetrahedra and were] left out",
-            ));
+            let text = "[triangle is no face of a tetrahedron and was|triangles are no faces of tetrahedra and were] left out";
+            file.notes.push(counted(n_stray, text));
         }
         builder.end_file()?;
         Ok(KeptFaces { kept, on_surface, surface: builder.finish() })
+    }
+
+    /// Returns whether a face is on the boundary or between regions, and whether it is between sub-domains.
+    fn role(&mut self, behind: u32, front: u32) -> (bool, bool) {
+        if front == NONE {
+            return (true, false);
+        }
+        let [a, b] = [behind, front].map(|tet| self.tets.get(tet as usize));
+        (a[4] != b[4], a[5] != b[5])
+    }
+
+    /// The numbers in the surface of a face's vertices; new ones are added.
+    fn on_surface(
+        &mut self,
+        face: [u32; 3],
+        builder: &mut SurfaceBuilder,
+        on_surface: &mut SpillVec<u32>,
+    ) -> Result<[u32; 3], PipelineError> {
+        let mut corners = [0; 3];
+        for (corner, v) in corners.iter_mut().zip(face) {
+            *corner = on_surface.get(v as usize);
+            if *corner == NONE {
+                *corner = builder.n_file_vertices() as u32;
+                builder.vertex(self.point(v))?;
+                on_surface.set(v as usize, *corner);
+            }
+        }
+        Ok(corners)
     }
 }
 
@@ -265,6 +270,7 @@ fn label_of(builder: &mut SurfaceBuilder, labels: &mut Vec<u32>, file: &FileTria
     labels.sort_unstable();
     labels.dedup();
     let name = |&label: &u32| match &file.labels.list[label as usize] {
+        (0, name) if name.is_empty() => file.stem.clone(),
         (number, name) if name.is_empty() => number.to_string(),
         (_, name) => name.clone(),
     };

@@ -73,12 +73,15 @@ pub fn place(
     let tets = placing.check(&mut raw_tets, space, watch, &mut notes)?;
     drop(raw_tets);
     let Placing { vertices, parts_of, .. } = placing;
-    let file = FileTriangles { triangles: triangles.finish(), labels, stem };
-    match_faces(vertices, tets, parts_of, file, regions, notes, space, watch)
+    let triangles = triangles.finish();
+    let file = FileTriangles { triangles, labels, stem, regions, notes };
+    match_faces(vertices, tets, parts_of, file, space, watch)
 }
 
-/// Triangles of the file.
+/// Triangles of the file, and what else is kept of it.
 pub struct FileTriangles {
+    pub regions: Vec<(u32, String)>,
+    pub notes: Vec<String>,
     pub triangles: SpillVec<[u32; 4]>,
     pub labels: Groups,
     pub stem: String,

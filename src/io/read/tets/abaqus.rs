@@ -29,7 +29,6 @@ struct Deck<'a> {
     n_parts: u32,
     /// Members of sets and surfaces that are not taken.
     n_unknown: u64,
-    surfaces: HashMap<String, u32>,
 }
 
 pub fn read<R: BufRead>(mut feed: Feed<R>, mesh: &mut RawMesh) -> Result<()> {
@@ -45,7 +44,6 @@ pub fn read<R: BufRead>(mut feed: Feed<R>, mesh: &mut RawMesh) -> Result<()> {
         n_sets: 0,
         n_parts: 0,
         n_unknown: 0,
-        surfaces: HashMap::new(),
     };
     while let Some((mut text, place)) = line(&mut feed, "**")? {
         let is_keyword = text.trim_start().starts_with('*');
@@ -109,9 +107,7 @@ impl Deck<'_> {
                 self.is_range = options.contains_key("GENERATE");
             }
             "*SURFACE" => {
-                let id = self.surfaces.len() as u32 + 1;
-                let id = *self.surfaces.entry(value("NAME")).or_insert(id);
-                self.group = self.mesh.labels.with_name(id.into(), || value("NAME"));
+                self.group = self.mesh.labels.named(&value("NAME"));
             }
             "*NSET" => self.n_sets += 1,
             "*PART" => {
@@ -160,6 +156,15 @@ impl Deck<'_> {
             }
             n += 1;
         }
+        let is_face = is(&["S", "DS", "R3D", "M3D", "CPS", "CPE", "F3D"]) && !is(&["SC", "SPRING"]);
+        if is_face && [4, 7].contains(&n) {
+            let corners = self.corners::<3, R>(&numbers[1..], place, feed)?;
+            self.mesh.n_curved += u64::from(n > 4);
+            let name = self.mesh.regions.list[self.group as usize].1.clone();
+            let label = self.mesh.labels.named(&name);
+            self.mesh.triangle(corners, label);
+            return Ok(());
+        }
         let declared = ["C3D", "DC3D", "AC3D"].iter().find_map(|p| self.kind.strip_prefix(p));
         let digits = |rest: &str| rest.chars().take_while(char::is_ascii_digit).collect::<String>();
         let declared = declared.and_then(|rest| digits(rest).parse::<usize>().ok());
@@ -167,15 +172,25 @@ impl Deck<'_> {
             let what = format!("elements of the type {} with {} nodes", self.kind, n.max(1) - 1);
             return Err(unsupported(place, what));
         }
-        let mut corners = [0; 4];
-        for (corner, &number) in corners.iter_mut().zip(&numbers[1..]) {
-            let found = self.nodes.find(number, &self.mesh.space, feed);
-            *corner = found.map_err(|e| e.at_spot(place.spot))?;
-        }
+        let corners = self.corners::<4, R>(&numbers[1..], place, feed)?;
         self.mesh.n_curved += u64::from(n > 5);
         self.elements.push(numbers[0], &self.mesh.space);
         let taken = self.mesh.tet(corners, self.group, 0);
         taken.map_err(|fault: ReadFault| place.refuse(fault))
+    }
+
+    fn corners<const N: usize, R: BufRead>(
+        &mut self,
+        numbers: &[i64],
+        place: &FilePlace,
+        feed: &Feed<R>,
+    ) -> Result<[u32; N]> {
+        let mut corners = [0; N];
+        for (corner, &number) in corners.iter_mut().zip(numbers) {
+            let found = self.nodes.find(number, &self.mesh.space, feed);
+            *corner = found.map_err(|e| e.at_spot(place.spot))?;
+        }
+        Ok(corners)
     }
 
     /// Puts elements into the set, unless they are in one.

@@ -39,6 +39,15 @@ pub fn read<R: BufRead>(feed: Feed<R>, has_parts: bool, mesh: &mut RawMesh) -> R
 }
 
 impl TetSink<'_> {
+    /// Notes a section that is passed over.
+    pub fn skip(&mut self, section: &[u8]) {
+        let known: [&[u8]; 2] = [b"$Comments", b"$Periodic"];
+        if !known.contains(&section) {
+            let section = String::from_utf8_lossy(section);
+            self.mesh.notes.push(format!("the section {section} was left out"));
+        }
+    }
+
     pub fn node(&mut self, tag: i64, p: Point) {
         self.nodes.push(tag, &self.mesh.space);
         self.mesh.point(p);
@@ -63,7 +72,8 @@ impl TetSink<'_> {
             (Role::Thin, _) => mesh.n_thin += 1,
             (Role::Face, 3) => {
                 let corners = [find(0)?, find(1)?, find(2)?];
-                for &group in groups.iter().filter(|group| **group != 0) {
+                let none = [0];
+                for &group in if groups.is_empty() { &none } else { groups } {
                     let label = mesh.labels.with_name(group, || name(group, 2));
                     mesh.triangle(corners, label);
                 }

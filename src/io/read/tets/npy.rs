@@ -66,10 +66,8 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
         for _ in 0..n {
             let [a, b, c] = [(); 3].map(|()| vertex(&mut corners, n_points));
             let corners = [a?, b?, c?];
-            if labels.is_some() {
-                let label = mesh.labels.number(next(&mut labels)?);
-                mesh.triangle(corners, label);
-            }
+            let label = mesh.labels.number(next(&mut labels)?);
+            mesh.triangle(corners, label);
         }
     }
     Ok(())

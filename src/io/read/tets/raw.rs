@@ -5,7 +5,7 @@ use std::io::BufRead;
 
 use super::{Feed, ReadFault, Result};
 use tetdb_base::geom::{Point, counted};
-use tetdb_base::storage::{ScratchSpace, SpillVec, SpillVecBuilder};
+use tetdb_base::storage::{ScratchSpace, SpillVec, SpillVecBuilder, check_cancelled};
 
 /// Most tetrahedra of a mesh: four faces of each have 32-bit numbers.
 const TETS_MAX: usize = 1 << 30;
@@ -115,6 +115,9 @@ impl RawMesh {
             let what = format!("a mesh of more than {TETS_MAX} tetrahedra");
             return Err(ReadFault::Unsupported(what));
         }
+        if self.tets.len().is_multiple_of(1 << 16) {
+            check_cancelled();
+        }
         self.tets.push([a, b, c, d, region, part]);
         Ok(())
     }
@@ -164,11 +167,12 @@ impl NodeNumbers {
         }
         if let Some(all) = &mut self.sparse {
             all.push(number);
+            self.table = None;
         }
         self.n += 1;
     }
 
-    /// The position of a node; all are pushed before the first call. Errors: there is no such node; two have one number.
+    /// The position of a node. Errors: there is no such node; two have one number.
     #[inline]
     pub fn find<R: BufRead>(
         &mut self,
@@ -176,7 +180,7 @@ impl NodeNumbers {
         space: &ScratchSpace,
         feed: &Feed<R>,
     ) -> Result<u32> {
-        if self.sparse.is_some() {
+        if self.sparse.is_some() && self.table.is_none() {
             self.build(space, feed)?;
         }
         let (low, n) = match &mut self.table {
@@ -194,8 +198,7 @@ impl NodeNumbers {
     }
 
     fn build<R: BufRead>(&mut self, space: &ScratchSpace, feed: &Feed<R>) -> Result<()> {
-        let Some(all) = self.sparse.take() else { return Ok(()) };
-        let mut all = all.finish();
+        let Some(all) = &mut self.sparse else { return Ok(()) };
         let (mut low, mut high) = (i64::MAX, i64::MIN);
         for i in 0..all.len() {
             (low, high) = (low.min(all.get(i)), high.max(all.get(i)));

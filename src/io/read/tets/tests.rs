@@ -78,7 +78,7 @@ fn one_mesh_is_the_same_in_every_format() {
     check(read("a.mesh", MEDIT), (9, ""), [0; 2]);
     check(read("a.msh", GMSH), (9, "wall"), [0; 2]);
     check(read("a.msh", GMSH4), (9, "wall"), [0; 2]);
-    check(read("a.inp", ABAQUS), (1, "wall"), [0; 2]);
+    check(read("a.inp", ABAQUS), (1 << 40, "wall"), [0; 2]);
     let tetgen =
         [("a.ele", ELE), ("a.node", NODE), ("a.face", FACE)].map(|(n, t)| (n, t.as_bytes()));
     check(read_with(&tetgen, MeshFields::default()), (9, ""), [0; 2]);
@@ -87,6 +87,13 @@ fn one_mesh_is_the_same_in_every_format() {
     check(read_with(&[("a.vtu", VTU.as_bytes())], fields), (9, ""), [4, 3]);
     let fields = MeshFields { part: Some("partition"), region: None };
     check(read_with(&[("a.msh", GMSH.as_bytes())], fields), (9, "wall"), [7, 7]);
+    let twice = ABAQUS.replacen(
+        "*ELSET",
+        "*NODE\n90, 5, 5, 5\n*ELEMENT, TYPE=C3D4, ELSET=all\n70, 90, 2, 3, 7\n*ELSET",
+        1,
+    );
+    let mut twice = read("a.inp", &twice).expect("it can be read");
+    assert_eq!((twice.tets.len(), twice.tets.get(2)[0]), (3, 5));
     let named = read("a.inp", ABAQUS).expect("it can be read");
     assert!(named.regions.list.iter().any(|group| group.1 == "rock"));
     assert_eq!(read("a.mesh", MEDIT).expect("as above").notes, ["1 line or point was left out"]);

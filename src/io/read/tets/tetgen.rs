@@ -87,7 +87,7 @@ fn read_nodes<R: BufRead>(
     Ok(())
 }
 
-/// Triangles with a marker other than 0 have it as label.
+/// Triangles with their markers as labels; those without markers are the boundary again.
 fn read_faces<R: BufRead>(
     mut feed: Feed<R>,
     nodes: &mut NodeNumbers,
@@ -104,10 +104,8 @@ fn read_faces<R: BufRead>(
         }
         if has_markers > 0 {
             let marker = feed.integer("the marker of a face")?;
-            if marker != 0 {
-                let label = mesh.labels.number(marker);
-                mesh.triangle(corners, label);
-            }
+            let label = mesh.labels.number(marker);
+            mesh.triangle(corners, label);
         }
         feed.skip_line()?;
     }

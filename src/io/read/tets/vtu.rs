@@ -10,7 +10,7 @@ use super::numbers::{Coding, Layout, Numbers};
 use super::{FilePlace, MeshFields, RawMesh, ReadError, ReadFault, Result};
 use crate::read::error::Spot;
 use crate::read::feed::{check_point, quote};
-use crate::read::open::open_plain;
+use crate::read::open::{open_plain, unpacked_name};
 use crate::read::xml::Tag;
 use tetdb_base::geom::{Point, counted};
 
@@ -51,6 +51,19 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
         n_ghosts += grid.cells(piece, first, fields, mesh)?;
         first += piece.n_points;
     }
+    let mut left_out: Vec<&str> = Vec::new();
+    for array in grid.pieces.iter().flat_map(|piece| &piece.arrays) {
+        let name = array.name.as_str();
+        let is_taken =
+            [fields.region, fields.part, Some("region"), Some("label")].contains(&Some(name));
+        let is_values = ["PointData", "CellData"].contains(&array.section.as_str());
+        if is_values && !is_taken && name != "vtkGhostType" && !left_out.contains(&name) {
+            left_out.push(name);
+        }
+    }
+    if !left_out.is_empty() {
+        mesh.notes.push(format!("arrays of values were left out: {}", left_out.join(", ")));
+    }
     if n_ghosts > 0 {
         let text = "[cell is a copy of one in another piece and was|cells are copies of those in other pieces and were] left out";
         mesh.notes.push(counted(n_ghosts, text));
@@ -64,6 +77,10 @@ impl Grid {
     }
 
     fn open(path: &Path, block_max: u64) -> Result<Self> {
+        if unpacked_name(path) != path {
+            let what = "a packed .vtu, which is read at several places at once,".to_owned();
+            return Err(FilePlace::new(path).refuse(ReadFault::Unsupported(what)));
+        }
         let (mut file, _) = open_plain(path)?;
         let mut grid = Self {
             name: path.to_string_lossy().into_owned(),
@@ -262,11 +279,9 @@ impl Grid {
                 }
                 (5, 3) | (22, 6) | (69, 3..) => {
                     mesh.n_curved += u64::from(n > 3);
-                    if labels.is_some() || regions.is_some() {
-                        let label = if labels.is_some() { label } else { region };
-                        let label = mesh.labels.number(label);
-                        mesh.triangle([a, b, c], label);
-                    }
+                    let label = if labels.is_some() { label } else { region };
+                    let label = mesh.labels.number(label);
+                    mesh.triangle([a, b, c], label);
                 }
                 (1..=4 | 21 | 35 | 68, _) => mesh.n_thin += 1,
                 _ => {
