@@ -7,7 +7,7 @@ use tetdb_base::surface::show;
 
 use tetdb_base::geom::Point;
 
-/// Places of a fault that are told.
+/// Places of a fault that are listed.
 const PLACES_MAX: usize = 5;
 
 /// A fault of a mesh with the places of the first elements that have it.

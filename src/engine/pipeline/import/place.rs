@@ -61,7 +61,7 @@ pub fn place(
     let (mut raw_points, mut raw_tets) = (points.finish(), tets.finish());
     if raw_tets.is_empty() {
         let what = "the file holds no tetrahedra";
-        let help = "give a file with a volume mesh; `mesh` takes a surface";
+        let help = "give a file with a volume mesh; a surface has to be meshed";
         return Err(BadMesh::new(what, help).into());
     }
     let mut notes = notes;

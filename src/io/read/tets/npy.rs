@@ -47,13 +47,13 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
     };
     let mut regions = column(fields.region, "region", n)?;
     let mut parts = column(fields.part, "", n)?;
-    let next = |list: &mut Option<Numbers>| list.as_mut().map_or(Ok(0), Numbers::whole);
+    let next = |list: &mut Option<Numbers>| list.as_mut().map_or(Ok(0), Numbers::integer);
     for _ in 0..n {
         let four = [(); 4].map(|()| vertex(&mut corners, n_points));
         let [a, b, c, d] = four;
         let region = mesh.regions.number(next(&mut regions)?);
         let part = match &mut parts {
-            Some(parts) => mesh.parts.number(parts.whole()?),
+            Some(parts) => mesh.parts.number(parts.integer()?),
             None => 0,
         };
         let taken = mesh.tet([a?, b?, c?, d?], region, part);
@@ -74,7 +74,7 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
 }
 
 fn vertex(corners: &mut Numbers, n: u64) -> Result<u32> {
-    let v = corners.whole()?;
+    let v = corners.integer()?;
     let known = u64::try_from(v).ok().filter(|&v| v < n);
     known.map(|v| v as u32).ok_or_else(|| {
         let (low, high) = (0, n as i64 - 1);

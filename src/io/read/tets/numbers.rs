@@ -172,7 +172,7 @@ impl Numbers {
 
     /// The next number, which must be whole.
     #[inline]
-    pub fn whole(&mut self) -> Result<i64> {
+    pub fn integer(&mut self) -> Result<i64> {
         let found = match &mut self.from {
             From::Text(feed) => {
                 feed.need_word(self.what)?;

@@ -244,15 +244,15 @@ impl Grid {
         let ghost = Some("vtkGhostType").filter(has);
         let mut ghosts = self.cell_array(piece, ghost, "the kind of a copied cell")?;
         let (mut from, mut n_ghosts) = (0, 0);
-        let next = |list: &mut Option<Numbers>| list.as_mut().map_or(Ok(0), Numbers::whole);
+        let next = |list: &mut Option<Numbers>| list.as_mut().map_or(Ok(0), Numbers::integer);
         for cell in 0..piece.n_cells {
-            let (kind, end) = (types.whole()?, ends.whole()?);
+            let (kind, end) = (types.integer()?, ends.integer()?);
             let mut corners = [0; 4];
             let n = end.checked_sub(from).filter(|n| (0..=1 << 20).contains(n));
             let n = n.ok_or_else(|| self.expected(0, "offsets of cells that rise"))?;
             from = end;
             for k in 0..n as usize {
-                let v = vertices.whole()?;
+                let v = vertices.integer()?;
                 let known = u64::try_from(v).ok().filter(|&v| v < piece.n_points);
                 let Some(v) = known else {
                     let (low, high) = (0, piece.n_points as i64 - 1);
