@@ -90,7 +90,7 @@ fn sub_domains_are_those_of_planes_or_of_the_file() {
         assert_eq!(counts.len(), n);
         assert!(counts.iter().all(|&k| k + 1 >= total / n as u64), "{counts:?}");
     }
-    place.run_line("query b.tetdb --at 0.5,0.5,0.5").succeeds();
+    place.run_line("query b.tetdb --point 0.5,0.5,0.5").succeeds();
     place.run_line("export b.tetdb c.pvtu c.foam").succeeds();
     place.run_line("snapshot b.tetdb b.png").succeeds();
     place.run_line("report b.tetdb b.html").succeeds();

@@ -1,7 +1,7 @@
 //! Faces of an imported mesh: matched in pairs; those that are kept are the surface and the interfaces.
 
 use super::BadMesh;
-use super::place::{AT_ONCE, FileTriangles, Parts, Placed, Vertices};
+use super::place::{AT_ONCE, FileTriangles, Kept, Parts, Placed, Vertices};
 use super::records::{FaceSide, PartTet, SharedVertex};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
@@ -13,10 +13,6 @@ use tetdb_schema::record::{FACES, SealedTet};
 use tetdb_store::sealed::{BitSet, FacePairs, Paired, sorted_face};
 
 const CONFORM_HELP: &str = "repair the mesh where it comes from: two tetrahedra share a whole face, an edge, a vertex or nothing";
-
-/// A face that is kept: three vertices, the tetrahedra behind and in front of it, and its number in the surface. [`NONE`] where there is
-/// no such tetrahedron or the face is no part of the surface.
-pub type Kept = [u32; 6];
 
 /// Tetrahedra with their sub-domains, and what is collected while their faces are matched.
 struct Matching<'a> {

@@ -11,9 +11,11 @@ mod bad_mesh;
 mod faces;
 mod place;
 mod planes;
+mod prepare;
 mod records;
 mod write;
 
 pub use bad_mesh::BadMesh;
-pub use place::{Placed, place};
+pub use place::Placed;
+pub use prepare::place;
 pub use write::write;

@@ -3,7 +3,6 @@
 use std::collections::{BTreeSet, HashMap};
 
 use super::BadMesh;
-use super::faces::{Kept, match_faces};
 use super::planes::{Planes, SAMPLE_MAX};
 use super::records::{PartTet, SharedVertex};
 use crate::pipeline::error::PipelineError;
@@ -12,7 +11,7 @@ use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::geom::{Aabb, HilbertFrame, Point, counted, orient};
 use tetdb_base::storage::{KeyedId, ScratchSpace, Sorter, SpillVec, check_cancelled, map_into};
 use tetdb_base::surface::Surface;
-use tetdb_io::read::{Groups, RawMesh};
+use tetdb_io::read::Groups;
 use tetdb_schema::ids::SubdomainId;
 use tetdb_schema::page::NONE;
 
@@ -22,6 +21,10 @@ pub const AT_ONCE: usize = 1 << 15;
 const REGION_MAX: i64 = 1 << 16;
 const TURNED_HELP: &str = "write the mesh with corners in one order throughout; each first face must turn the same way seen from the fourth corner";
 const FLAT_HELP: &str = "remove flat tetrahedra, or mesh again";
+
+/// A face that is kept: three vertices, the tetrahedra behind and in front of it, and its number in the surface. [`NONE`] where there is
+/// no such tetrahedron or the face is no part of the surface.
+pub type Kept = [u32; 6];
 
 /// A checked mesh, ready to be written.
 pub struct Placed {
@@ -47,37 +50,6 @@ pub struct Placed {
     pub(super) kept: SpillVec<Kept>,
 }
 
-/// Checks a mesh and places its tetrahedra in `parts` sub-domains: those of the file if it has any, else so many or as fits its size.
-///
-/// Errors: a mesh without tetrahedra, with a repeated, flat or turned tetrahedron, or one that does not conform. Unwinds where the disk
-/// fails.
-pub fn place(
-    mesh: RawMesh,
-    parts: Option<u32>,
-    space: &ScratchSpace,
-    watch: &Watcher,
-) -> Result<Placed, PipelineError> {
-    let RawMesh { stem, points, tets, triangles, regions, labels, parts: groups, notes, .. } = mesh;
-    let (mut raw_points, mut raw_tets) = (points.finish(), tets.finish());
-    if raw_tets.is_empty() {
-        let what = "the file holds no tetrahedra";
-        let help = "give a file with a volume mesh; a surface has to be meshed";
-        return Err(BadMesh::new(what, help).into());
-    }
-    let mut notes = notes;
-    let (vertices, used) = renumber(&mut raw_points, &mut raw_tets, space, &mut notes)?;
-    drop(raw_points);
-    let (region_rank, regions) = region_numbers(&regions, &used);
-    let mut placing =
-        Placing { vertices, parts_of: Parts::new(parts, &groups, &raw_tets)?, region_rank };
-    let tets = placing.check(&mut raw_tets, space, watch, &mut notes)?;
-    drop(raw_tets);
-    let Placing { vertices, parts_of, .. } = placing;
-    let triangles = triangles.finish();
-    let file = FileTriangles { triangles, labels, stem, regions, notes };
-    match_faces(vertices, tets, parts_of, file, space, watch)
-}
-
 /// Triangles of the file, and what else is kept of it.
 pub struct FileTriangles {
     pub regions: Vec<(u32, String)>,
@@ -95,7 +67,8 @@ pub struct Vertices {
     pub bounds: Aabb,
 }
 
-fn renumber(
+/// Renumbers the used vertices; returns the used regions too. Errors: a vertex that is not there.
+pub fn renumber(
     raw: &mut SpillVec<[f64; 3]>,
     tets: &mut SpillVec<[u32; 6]>,
     space: &ScratchSpace,
@@ -163,7 +136,7 @@ fn renumber(
 }
 
 /// The new number of each group, and number and name of each region. Numbers of the file are kept if they can be.
-fn region_numbers(groups: &Groups, used: &BTreeSet<u32>) -> (Vec<u32>, Vec<(u32, String)>) {
+pub fn region_numbers(groups: &Groups, used: &BTreeSet<u32>) -> (Vec<u32>, Vec<(u32, String)>) {
     let none = (0, String::new());
     let group = |g: u32| groups.list.get(g as usize).unwrap_or(&none);
     let mut order: Vec<u32> = used.iter().copied().collect();
@@ -194,7 +167,12 @@ pub enum Parts {
 }
 
 impl Parts {
-    fn new(n: Option<u32>, groups: &Groups, tets: &SpillVec<[u32; 6]>) -> Result<Self, BadMesh> {
+    /// The parts of the file if it has any, else planes for `n` or as many as fit. Errors: too many parts.
+    pub fn new(
+        n: Option<u32>,
+        groups: &Groups,
+        tets: &SpillVec<[u32; 6]>,
+    ) -> Result<Self, BadMesh> {
         let n_tets = tets.len() as u64;
         let found = match groups.list.len() {
             0 => {
@@ -235,15 +213,17 @@ fn middle(corners: &[Point; 4]) -> Point {
     corners.iter().sum::<Point>() / 4.0
 }
 
-struct Placing {
-    vertices: Vertices,
-    parts_of: Parts,
-    region_rank: Vec<u32>,
+/// Tetrahedra being checked.
+pub struct Placing {
+    pub vertices: Vertices,
+    pub parts_of: Parts,
+    /// The new number of each region.
+    pub region_rank: Vec<u32>,
 }
 
 impl Placing {
     /// Renumbers and checks all tetrahedra, and chooses the planes. If all are negative, they are turned.
-    fn check(
+    pub fn check(
         &mut self,
         raw: &mut SpillVec<[u32; 6]>,
         space: &ScratchSpace,

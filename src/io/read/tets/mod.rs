@@ -5,6 +5,7 @@
 
 mod abaqus;
 mod gmsh;
+mod gmsh_sink;
 mod medit;
 mod npy;
 mod numbers;
@@ -19,18 +20,9 @@ use std::path::Path;
 use super::feed::Feed;
 use super::open::open;
 use super::{FilePlace, Format, ReadError, ReadFault, Result};
-pub(super) use gmsh::TetSink;
+pub(super) use gmsh_sink::TetSink;
 pub use npy::tets_file;
-pub use raw::{Groups, RawMesh};
-
-/// How a mesh file is read.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct MeshFields<'a> {
-    /// The array of cells that gives parts.
-    pub part: Option<&'a str>,
-    /// The array of cells that gives regions.
-    pub region: Option<&'a str>,
-}
+pub use raw::{Groups, MeshFields, RawMesh};
 
 const ENDINGS: ReadFault = ReadFault::UnknownFormat(
     "name the file .mesh, .meshb, .msh, .vtu, .ele, .inp or .npy after what it holds, with .gz or .zst behind it where it is packed",

@@ -11,6 +11,9 @@ use crate::read::xml::base64_word;
 /// Bytes read at once.
 const BUFFER_BYTES: usize = 1 << 16;
 
+/// Most packed blocks of an array: at the usual 32 KiB each 128 GiB.
+const BLOCKS_MAX: u64 = 1 << 22;
+
 /// How a list of bytes is stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Coding {
@@ -208,6 +211,9 @@ impl Binary {
         }
         let (size, last) = (self.length()?, self.length()?);
         if size.max(last) > self.layout.block_max {
+            return None;
+        }
+        if n > BLOCKS_MAX {
             return None;
         }
         for _ in 0..n {

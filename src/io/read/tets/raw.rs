@@ -38,6 +38,15 @@ pub struct RawMesh {
     pub(super) n_curved: u64,
 }
 
+/// How a mesh file is read.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MeshFields<'a> {
+    /// The array of cells that gives parts.
+    pub part: Option<&'a str>,
+    /// The array of cells that gives regions.
+    pub region: Option<&'a str>,
+}
+
 /// Groups of elements by number, some with a name.
 #[derive(Clone, Debug, Default)]
 pub struct Groups {
