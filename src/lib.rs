@@ -8,7 +8,7 @@ pub use tetdb_engine::api::{
     CellArrays, CheckReport, ChunkCounts, CloseReport, ClosedHole, Code, ColorBy, Comparison,
     Condition, Defect, DefectPlace, EmbedOutside, EmbeddedInfo, EmbeddedKind, Error, Event,
     Existing, ExportOptions, Exported, ExprError, Field, FieldIds, FieldNumber, FieldPlace,
-    FieldRange, FieldReader, FieldSource, FieldValues, GatherReport, LabelSet, Length,
+    FieldRange, FieldReader, FieldSource, FieldValues, GatherReport, Import, LabelSet, Length,
     MESH_ENDINGS, MeshFormat, MeshOptions, Mesher, NewField, Optimize, OptionsText, Order,
     Population, Prediction, Qualities, Query, RegionInfo, Regions, Remesh, RemeshForecast,
     Remeshed, RepairKind, RepairReport, RepairStep, Reported, ResolveReport, Resolved,

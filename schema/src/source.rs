@@ -37,6 +37,8 @@ pub enum Origin {
     Wrapped(String),
     /// The surface was remeshed within a tolerance; how, in words. The fingerprint is that of the remeshed surface.
     Remeshed(String),
+    /// The tetrahedra came from this file, by its absolute path; the surface is theirs.
+    Imported(String),
     /// All parts that are not closed are sheets.
     OpenParts,
     /// Embedded edges.
@@ -67,6 +69,7 @@ const CLOSED: &str = "closed:";
 const WELDED: &str = "welded:";
 const WRAPPED: &str = "wrapped:";
 const REMESHED: &str = "remeshed:";
+const IMPORTED: &str = "imported:";
 const OPEN_PARTS: &str = "open-parts:";
 const EDGES: &str = "edges:";
 const POINTS: &str = "points:";
@@ -100,6 +103,8 @@ impl Source {
             Origin::Wrapped(rest.to_owned())
         } else if let Some(rest) = after(REMESHED) {
             Origin::Remeshed(rest.to_owned())
+        } else if let Some(rest) = after(IMPORTED) {
+            Origin::Imported(rest.to_owned())
         } else if let Some(rest) = after(SHEETS_FROM) {
             Origin::SheetsFrom(rest.parse().ok()?)
         } else if let Some(rest) = after(SHEET) {
@@ -132,6 +137,7 @@ impl Source {
             Origin::Welded(what) => format!("{WELDED}{what}"),
             Origin::Wrapped(what) => format!("{WRAPPED}{what}"),
             Origin::Remeshed(what) => format!("{REMESHED}{what}"),
+            Origin::Imported(file) => format!("{IMPORTED}{file}"),
             Origin::OpenParts => OPEN_PARTS.to_owned(),
             Origin::Edges(file) => named(EDGES, file),
             Origin::Points(file) => named(POINTS, file),
@@ -184,6 +190,7 @@ mod tests {
             "welded:share=1e-6,joined=4",
             "wrapped:gap=1e-2,offset=1e-3",
             "remeshed:tolerance=1e-3,angle=40",
+            "imported:/home/a/part.msh",
             "edges:well=/home/a/wells.obj",
             "points:sensor=/home/a/p.csv",
             "wires:12,3",

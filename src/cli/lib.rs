@@ -14,6 +14,7 @@ mod export;
 mod failure;
 mod field;
 mod heap;
+mod import;
 mod info;
 mod input;
 mod memory;
@@ -191,6 +192,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
     }
     match command {
         Command::Mesh(args) => mesh::run(args, console),
+        Command::Import(args) => import::run(args, console),
         Command::Estimate(args) => estimate::run(args, console),
         Command::Resume(args) => mesh::resume(args, console),
         Command::Plan(args) => tasks::plan(args, console),

@@ -124,7 +124,7 @@ pub(super) fn output(args: &MeshArgs) -> PathBuf {
 }
 
 /// Exports the mesh and prints a summary.
-fn finish(
+pub(super) fn finish(
     path: &Path,
     args: &RunArgs,
     settings: &Settings,

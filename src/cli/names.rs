@@ -1,13 +1,14 @@
 //! Names of the store and the surface of a command, for help that can be copied.
 
 use super::args::{Command, SheetArgs};
-use super::mesh;
 use super::words::quoted;
+use super::{import, mesh};
 
 /// The names that stand for STORE and SURFACE in help, as a shell reads them.
 pub fn names(command: &Command) -> Vec<(&'static str, String)> {
     let (store, surfaces) = match command {
         Command::Mesh(a) => (Some(mesh::output(a)), plain(&a.surfaces, &a.sheets)),
+        Command::Import(a) => (Some(import::output(a)), None),
         Command::Estimate(a) => (None, plain(&a.surfaces, &a.sheets)),
         Command::Check(a) => (None, plain(&a.surfaces, &a.sheets)),
         Command::RefineSurface(a) => {

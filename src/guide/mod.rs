@@ -7,6 +7,7 @@
 //! | [`sizes`] | say how long edges should be: everywhere, in places, by a formula or a file |
 //! | [`regions`] | choose which volumes are filled |
 //! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |
+//! | [`import`] | take over meshes of other programs |
 //! | [`cluster`] | share a mesh among the machines of a cluster |
 //! | [`questions`] | find tetrahedra by place, condition or neighborhood |
 //! | [`fields`] | keep values at vertices and tetrahedra, ask for them, export them |
@@ -27,6 +28,7 @@ macro_rules! links {
             "[regions]: crate::guide::regions\n",
             "[repair]: crate::guide::repair\n",
             "[subdomains]: crate::guide::subdomains\n",
+            "[import]: crate::guide::import\n",
             "[cluster]: crate::guide::cluster\n",
             "[questions]: crate::guide::questions\n",
             "[fields]: crate::guide::fields\n",
@@ -69,6 +71,10 @@ pub mod regions {
 pub mod subdomains {
     #![doc = links!()]
     #![doc = include_str!("subdomains.md")]
+}
+pub mod import {
+    #![doc = links!()]
+    #![doc = include_str!("import.md")]
 }
 pub mod cluster {
     #![doc = links!()]

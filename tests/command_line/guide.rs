@@ -161,6 +161,7 @@ chapters! {
     repair: 6,
     regions: 3,
     subdomains: 5,
+    import: 5,
     cluster: 8,
     questions: 8,
     fields: 8,

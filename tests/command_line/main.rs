@@ -11,6 +11,7 @@ mod fields;
 mod forms;
 mod groups;
 mod guide;
+mod import;
 mod json;
 mod limits;
 mod odd_inputs;

@@ -92,8 +92,13 @@ impl ScratchSpace {
 
     /// A sorter with a quarter of the free bytes.
     pub fn sorter<R: SortRecord>(&self) -> Sorter<R> {
+        self.sorter_within(self.available() / 4)
+    }
+
+    /// A sorter with so many bytes, which are not leased.
+    pub fn sorter_within<R: SortRecord>(&self, bytes: u64) -> Sorter<R> {
         match &self.dir {
-            Some(dir) => Sorter::new(dir, self.available() / 4),
+            Some(dir) => Sorter::new(dir, bytes),
             None => Sorter::new("", u64::MAX),
         }
     }
@@ -199,6 +204,22 @@ impl<T: Pod> SpillVecBuilder<T> {
             reserve(&mut self.memory, more);
         }
         self.memory.push(value);
+    }
+
+    /// Element `i`.
+    pub fn get(&mut self, i: usize) -> T {
+        match &mut self.paged {
+            Some(paged) => *paged.at(i),
+            None => self.memory[i],
+        }
+    }
+
+    /// Sets element `i` to `value`.
+    pub fn set(&mut self, i: usize, value: T) {
+        match &mut self.paged {
+            Some(paged) => *paged.at_mut(i) = value,
+            None => self.memory[i] = value,
+        }
     }
 
     /// Number of elements.

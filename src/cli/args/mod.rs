@@ -1,6 +1,7 @@
 //! What can be typed.
 
 mod field;
+mod import;
 mod mesh;
 mod query;
 mod resaturate;
@@ -15,6 +16,7 @@ mod words;
 use clap::{Parser, Subcommand};
 
 pub use field::{AddFieldArgs, FieldAction, FieldArgs};
+pub use import::ImportArgs;
 pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
 pub use query::QueryArgs;
 pub use resaturate::ResaturateArgs;
@@ -54,6 +56,11 @@ pub struct Args {
 pub enum Command {
     /// Mesh a closed surface into a store, and verify it
     Mesh(Box<MeshArgs>),
+    /// Take over a tetrahedral mesh that another program made
+    ///
+    /// The mesh is checked and changed in nothing: each tetrahedron positive, faces shared as wholes. The store is finished, and `query`,
+    /// `verify`, `export` and all else that needs no surface work on it.
+    Import(ImportArgs),
     /// Predict a mesh and the memory, disk and time it takes, without meshing
     ///
     /// Nothing is refused but a bad surface or option.
@@ -144,6 +151,7 @@ impl Command {
     pub fn is_json(&self) -> bool {
         match self {
             Self::Mesh(a) => a.run.json,
+            Self::Import(a) => a.run.json,
             Self::Estimate(a) => a.json,
             Self::Resume(a) => a.run.json,
             Self::Plan(a) => a.json,

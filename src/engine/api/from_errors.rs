@@ -179,6 +179,9 @@ impl From<PipelineError> for Error {
         match e {
             PipelineError::Surface(e) => e.into(),
             PipelineError::Boundary(e) => e.into(),
+            PipelineError::BadMesh(e) => {
+                Self::new(Code::BadMesh, &e).at(e.places.join("; ")).with_help(e.help)
+            }
             PipelineError::Sizing(e) => e.into(),
             PipelineError::Store(e) => e.into(),
             PipelineError::Storage(e) => e.into(),

@@ -17,6 +17,7 @@
 //! | `verify`, `verify_shared`, `verify_server` | verification, by one or several processes |
 //! | `ask`, `condition`, `answer_rows`, `answer_file` | questions and their answers |
 //! | `fields`, `field_spec`, `field_sources` | values kept with a finished mesh |
+//! | `import` | a mesh made by another program as a store |
 //! | `remesh`, `remesh_sizes` | meshing sub-domains again |
 //! | `tasks`, `tasks_status` | one mesh by the tasks of a batch scheduler |
 //! | `mpi` | one mesh by the ranks of an MPI program |
@@ -38,6 +39,7 @@ mod field_spec;
 mod fields;
 mod from_errors;
 mod guard;
+mod import;
 mod info;
 mod job;
 mod located;
@@ -94,6 +96,7 @@ pub use field_spec::NewField;
 pub use fields::{Field, FieldNumber, FieldPlace, FieldReader, FieldValues, Scalar};
 #[doc(hidden)]
 pub use guard::guarded;
+pub use import::Import;
 pub use info::{EmbeddedInfo, RegionInfo, StageInfo, StoreInfo, SubdomainInfo};
 #[doc(hidden)]
 pub use memory::default_cap;

@@ -12,6 +12,7 @@ use super::store::{open_finished, open_to_change};
 use super::{Error, Settings, Sizes, Store, Surface, field_spec, guarded, job, verify};
 use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Values};
 use tetdb_schema::catalog::SubdomainRow;
+use tetdb_schema::code::Code;
 use tetdb_store::audit::Level;
 use tetdb_store::store::{Catalog, StoreError, WriterLock};
 
@@ -253,7 +254,14 @@ impl Remesh {
 
     /// The options of the store, and the request for the pipeline.
     fn request(&self, open: &mut Catalog) -> Result<(Options, Resaturation), Error> {
-        let options = Options::from(job::options_of(&open.job()?, &self.path)?);
+        let job = open.job()?;
+        if job::is_imported(&job) {
+            let message = "the store was imported: its sub-domains have no coarse meshes from which they could be meshed again";
+            return Err(Error::new(Code::NoCoarseLeaf, message)
+                .at(self.path.display())
+                .with_help("mesh its surface anew: it is surface.obj in the store"));
+        }
+        let options = Options::from(job::options_of(&job, &self.path)?);
         let listed = match &self.ranks {
             RemeshRanks::Listed(ranks) => ranks.clone(),
             RemeshRanks::Changed => BTreeSet::new(),

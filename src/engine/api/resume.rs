@@ -10,6 +10,7 @@ use crate::pipeline;
 use tetdb_base::storage::Budget;
 use tetdb_base::surface;
 use tetdb_schema::catalog::StoreState;
+use tetdb_schema::code::Code;
 use tetdb_store::store::{Catalog, StoreError};
 
 impl Store {
@@ -45,6 +46,12 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
     let lock = catalog.lock().expect("it is open for writing");
     let job = catalog.job()?;
     if !catalog.state()?.is_finished() {
+        if job::is_imported(&job) {
+            let message = "an import was interrupted, and cannot be continued";
+            return Err(Error::new(Code::StoreUnfinished, message)
+                .at(place.display())
+                .with_help("import the mesh again, which begins anew"));
+        }
         job::check_recipe(&mut catalog)?;
         if let Some((task, host)) = pipeline::is_being_worked(&place)? {
             let (path, writer) = (place, format!("task {task} on {host}"));

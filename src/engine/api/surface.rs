@@ -462,6 +462,8 @@ impl Surface {
             Origin::Resolved(_) | Origin::Closed(_) | Origin::Welded(_) => {
                 self.repaired_again(origin, scratch)
             }
+            // The copy in the store is that of the mesh already.
+            Origin::Imported(_) => Ok(self),
             Origin::Wrapped(text) => self.wrapped_again(text, scratch),
             Origin::Remeshed(text) => self.remeshed_again(text, scratch),
             Origin::OpenParts | Origin::File(_) | Origin::Sample(_) | Origin::Copy => {

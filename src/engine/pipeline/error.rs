@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::import::BadMesh;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::RemoteFailure;
 use tetdb_base::storage::StorageError;
@@ -18,6 +19,9 @@ pub enum PipelineError {
     /// The surface is not valid.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
+    /// A mesh to import is not valid.
+    #[error(transparent)]
+    BadMesh(#[from] BadMesh),
     /// The surface could not be turned into the boundary of volumes.
     #[error(transparent)]
     Boundary(#[from] BoundaryError),

@@ -8,12 +8,14 @@
 //! | `mesh::divide` | bisected | one cut fewer than sub-domains; each refines a zone, chooses the interface and writes two children |
 //! | `work::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
 //! | `work`, `tasks` | | a cut or a sub-domain as an order, which any process can perform, and a receipt; batches for schedulers |
+//! | `import` | sealed | a mesh made elsewhere: checked, placed in sub-domains, sealed |
 //! | `remesh` | sealed | remesh sub-domains of a finished store from coarse snapshots, with other sizes or to repair damage; undo |
 //!
 //! The insertion of the surface's vertices may begin before the store exists (`mesh::head_start`). The pipeline receives a
 //! surface, not a path. It prints nothing: it reports [`Event`]s to a [`Watcher`].
 
 mod error;
+mod import;
 mod mesh;
 mod plan;
 mod progress;
@@ -25,6 +27,7 @@ mod work;
 mod workers;
 
 pub use error::PipelineError;
+pub use import::{BadMesh, Placed, place, write as write_placed};
 pub use mesh::coarse_mesh;
 pub use mesh::{CoarseReport, HeadStart, Summary, head_start, mesh, mesh_prepared};
 pub use plan::{

@@ -9,6 +9,7 @@ use std::io::BufRead;
 use super::feed::{Feed, name};
 use super::gmsh_numbers::{ElementType, GmshNumbers, NodeTags, Role, need_element_type};
 use super::solids::Solids;
+use super::tets::TetSink;
 use super::{ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::NoteKind;
@@ -39,6 +40,11 @@ pub(super) struct GmshReader<'a, 'b, R> {
     /// Names and groups of volumes, as of surfaces.
     pub(super) volume_names: HashMap<i64, String>,
     pub(super) volume_groups: HashMap<i64, Vec<i64>>,
+    /// Where a mesh of tetrahedra is read, not a surface.
+    pub(super) tets: Option<TetSink<'a>>,
+    /// Partition of each volume entity (4), and that of the current element; 0 for none.
+    pub(super) partitions: HashMap<i64, i64>,
+    pub(super) partition: i64,
 }
 
 /// A version of the format.
@@ -52,7 +58,7 @@ pub(super) enum Version {
 
 impl<'a, 'b, R: BufRead> GmshReader<'a, 'b, R> {
     /// Reads the head of a file.
-    fn open(mut feed: Feed<R>, target: &'a mut SurfaceSink<'b>) -> Result<Self> {
+    pub(super) fn open(mut feed: Feed<R>, target: &'a mut SurfaceSink<'b>) -> Result<Self> {
         feed.need_word("`$MeshFormat`")?;
         let (version, binary, big) = match feed.word() {
             b"$NOD" | b"$ELM" => (Version::V1, false, false),
@@ -76,6 +82,9 @@ impl<'a, 'b, R: BufRead> GmshReader<'a, 'b, R> {
             n_thin: 0,
             volume_names: HashMap::new(),
             volume_groups: HashMap::new(),
+            tets: None,
+            partitions: HashMap::new(),
+            partition: 0,
         })
     }
 }
@@ -101,46 +110,6 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Resul
     }
     mesh.target.end_cells(&mesh.numbers.feed)?;
     mesh.numbers.feed.finish(mesh.target.builder)
-}
-
-/// Points, tetrahedra between them, and a number at each point.
-pub(super) type NodeData = (Vec<Point>, Vec<[u32; 4]>, Vec<f64>);
-
-/// Reads the tetrahedra of a file and the numbers of its first `$NodeData` at the nodes that have one.
-pub(super) fn read_node_data<R: BufRead>(
-    feed: Feed<R>,
-    target: &mut SurfaceSink,
-) -> Result<NodeData> {
-    let mut mesh = GmshReader::open(feed, target)?;
-    mesh.node_data = Some(HashMap::new());
-    mesh.read_sections()?;
-    let data = mesh.node_data.take().unwrap_or_default();
-    let feed = &mesh.numbers.feed;
-    let mut at = HashMap::new();
-    for (&tag, &h) in &data {
-        at.insert(mesh.nodes.find(tag, feed)?, h);
-    }
-    let tets = mesh.solids.tets();
-    let (mut points, mut numbers, mut position) = (Vec::new(), Vec::new(), HashMap::new());
-    for v in 0..mesh.target.builder.n_file_vertices() as u32 {
-        if let (Some(&h), Some(p)) = (at.get(&v), mesh.target.builder.position(v)) {
-            position.insert(v, points.len() as u32);
-            points.push(p);
-            numbers.push(h);
-        }
-    }
-    let place = |t: [u32; 4]| {
-        let corners = t.map(|v| position.get(&v).copied());
-        match corners {
-            [Some(a), Some(b), Some(c), Some(d)] => Ok([a, b, c, d]),
-            _ => Err(feed.unexpected("a number at every node of the tetrahedra", b"fewer")),
-        }
-    };
-    let tets = tets.map(place).collect::<Result<Vec<_>>>()?;
-    match data.is_empty() {
-        true => Err(feed.unexpected("a section `$NodeData`", b"none")),
-        false => Ok((points, tets, numbers)),
-    }
 }
 
 /// The section `$MeshFormat`: the version, whether numbers are binary, and whether their high bytes come first.
@@ -181,7 +150,7 @@ fn read_format<R: BufRead>(feed: &mut Feed<R>) -> Result<(Version, bool, bool)> 
 }
 
 impl<R: BufRead> GmshReader<'_, '_, R> {
-    fn read_sections(&mut self) -> Result<()> {
+    pub(super) fn read_sections(&mut self) -> Result<()> {
         use Version::{V1, V2, V40, V41};
         // The first section of version 1 has no head before it.
         let mut is_taken = self.version == V1;
@@ -216,6 +185,9 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 (b"$Elements", V2) => self.read_elements_2_text("$EndElements")?,
                 (b"$Elements", _) => self.read_elements_4()?,
                 _ => {
+                    if let Some(tets) = &mut self.tets {
+                        tets.skip(&section);
+                    }
                     let end: &[u8] = if self.version == V1 { b"$END" } else { b"$End" };
                     self.numbers.feed.skip_past(&[end, &section[1..]].concat())?;
                 }
@@ -274,6 +246,10 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     }
 
     pub(super) fn node(&mut self, tag: i64, p: Point) -> Result<()> {
+        if let Some(tets) = &mut self.tets {
+            tets.node(tag, p);
+            return Ok(());
+        }
         if !self.nodes.push(tag) {
             let found = format!("node {tag} a second time");
             let expected = "nodes of different tags".to_owned();
@@ -293,6 +269,10 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         tags: &[i64; 8],
         groups: &[i64],
     ) -> Result<()> {
+        if let Some(sink) = &mut self.tets {
+            let names = [&self.names, &self.volume_names];
+            return sink.element(kind, tags, (groups, names), self.partition, &self.numbers.feed);
+        }
         let ElementType { n_nodes, n_corners, role } = kind;
         self.n_thin += u64::from(role == Role::Thin);
         if role == Role::Thin || role == Role::Face && self.target.leaves_out_face() {
@@ -341,7 +321,10 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                         self.inside.insert(entity);
                     }
                     self.numbers.int()?;
-                    self.int_list()?;
+                    let parts = self.int_list()?;
+                    if dimension == 3 {
+                        self.partitions.insert(entity, parts.first().copied().unwrap_or(0));
+                    }
                 }
                 let is_point = dimension == 0 && self.version == Version::V41;
                 for _ in 0..if is_point { 3 } else { 6 } {
@@ -458,6 +441,10 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 _ => None,
             };
             let groups = groups.and_then(|g| g.get(&entity)).cloned().unwrap_or_default();
+            self.partition = match dimension {
+                3 => self.partitions.get(&entity).copied().unwrap_or(0),
+                _ => 0,
+            };
             let is_inside = dimension == 2 && self.inside.contains(&entity);
             for k in 0..n {
                 self.numbers.need_record("elements", n, k)?;

@@ -3,9 +3,51 @@
 use std::collections::HashMap;
 use std::io::BufRead;
 
-use super::Result;
+use super::feed::Feed;
 use super::gmsh::{GmshReader, Version};
 use super::gmsh_numbers::{ElementType, need_element_type};
+use super::{Result, SurfaceSink};
+use tetdb_base::geom::Point;
+
+/// Points, tetrahedra between them, and a number at each point.
+pub(super) type NodeData = (Vec<Point>, Vec<[u32; 4]>, Vec<f64>);
+
+/// Reads the tetrahedra of a file and the numbers of its first `$NodeData` at the nodes that have one.
+pub(super) fn read_node_data<R: BufRead>(
+    feed: Feed<R>,
+    target: &mut SurfaceSink,
+) -> Result<NodeData> {
+    let mut mesh = GmshReader::open(feed, target)?;
+    mesh.node_data = Some(HashMap::new());
+    mesh.read_sections()?;
+    let data = mesh.node_data.take().unwrap_or_default();
+    let feed = &mesh.numbers.feed;
+    let mut at = HashMap::new();
+    for (&tag, &h) in &data {
+        at.insert(mesh.nodes.find(tag, feed)?, h);
+    }
+    let tets = mesh.solids.tets();
+    let (mut points, mut numbers, mut position) = (Vec::new(), Vec::new(), HashMap::new());
+    for v in 0..mesh.target.builder.n_file_vertices() as u32 {
+        if let (Some(&h), Some(p)) = (at.get(&v), mesh.target.builder.position(v)) {
+            position.insert(v, points.len() as u32);
+            points.push(p);
+            numbers.push(h);
+        }
+    }
+    let place = |t: [u32; 4]| {
+        let corners = t.map(|v| position.get(&v).copied());
+        match corners {
+            [Some(a), Some(b), Some(c), Some(d)] => Ok([a, b, c, d]),
+            _ => Err(feed.unexpected("a number at every node of the tetrahedra", b"fewer")),
+        }
+    };
+    let tets = tets.map(place).collect::<Result<Vec<_>>>()?;
+    match data.is_empty() {
+        true => Err(feed.unexpected("a section `$NodeData`", b"none")),
+        false => Ok((points, tets, numbers)),
+    }
+}
 
 impl<R: BufRead> GmshReader<'_, '_, R> {
     /// The count of a section of 2.2, which is text in binary files too.
@@ -92,10 +134,13 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     fn read_element_2(&mut self, kind: i64, n_tags: i64) -> Result<()> {
         let n_tags = self.numbers.check_count("element tags", n_tags, 1, 4)?;
         let mut group = 0;
+        self.partition = 0;
         for i in 0..n_tags {
             let tag = self.numbers.int()?;
-            if i == 0 {
-                group = tag;
+            match i {
+                0 => group = tag,
+                3 => self.partition = tag,
+                _ => {}
             }
         }
         let kind = need_element_type(kind, &self.numbers.feed)?;

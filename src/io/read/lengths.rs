@@ -77,6 +77,11 @@ impl ArrayFile {
         Ok(Self { from, name: path.display().to_string(), at: 0 })
     }
 
+    /// Bytes taken so far.
+    pub fn taken(&self) -> u64 {
+        self.at
+    }
+
     fn place(&self, spot: Spot) -> FilePlace {
         FilePlace { file: self.name.clone(), spot }
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::{FilePlace, ReadFault};
 use super::feed::{Feed, Result};
-use super::gmsh::{self, NodeData};
+use super::gmsh_old::{self, NodeData};
 use super::lengths::read_rows;
 use super::medit_numbers::{MeditNumbers, SectionRead};
 use super::open::{open, open_plain};
@@ -118,7 +118,7 @@ fn read_foreign(path: &Path, extension: &str, beside: &[PathBuf], limit: u64) ->
                 cells: VolumeCells::default(),
             };
             target.builder.begin_file(&whole.file);
-            gmsh::read_node_data(open(path, limit)?, &mut target)?
+            gmsh_old::read_node_data(open(path, limit)?, &mut target)?
         }
         "vtu" => read_vtu(path, limit)?,
         "mtr" => match read_mtr(path, beside, limit)? {

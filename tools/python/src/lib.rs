@@ -25,7 +25,7 @@ mod _native {
     #[pymodule_export]
     use super::part::{Part, qualities};
     #[pymodule_export]
-    use super::run::{mesh, predict, resume};
+    use super::run::{import_mesh, mesh, predict, resume};
     #[pymodule_export]
     use super::store::Store;
     #[pymodule_export]

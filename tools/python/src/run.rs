@@ -6,7 +6,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use serde_json::json;
 use tetdb::{
-    Bytes, CancelToken, EmbedOutside, Existing, Mesher, Optimize, Regions, Settings, Store,
+    Bytes, CancelToken, EmbedOutside, Existing, Import, Mesher, Optimize, Regions, Settings, Store,
     Subdomains,
 };
 
@@ -121,6 +121,37 @@ pub fn mesh(
         .coarse_only(coarse_only);
     let listener = Listener { board: &board, callable: callable.as_ref() };
     let work = || mesher.create_unfinished(path).map_err(Failure::from);
+    watched(py, &token, Some(&listener), work)
+}
+
+/// Imports a mesh file into a new store. `how`: number of sub-domains, array of parts, array of regions.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "called by the Python half alone")]
+pub fn import_mesh(
+    py: Python<'_>,
+    file: PathBuf,
+    path: PathBuf,
+    how: (Option<u32>, Option<String>, Option<String>),
+    settings: SettingWords,
+    replace: bool,
+    verify: bool,
+    callable: Option<Py<PyAny>>,
+) -> PyResult<()> {
+    let (token, board) = (CancelToken::new(), Arc::new(Board::default()));
+    let (subdomains, parts, regions) = how;
+    let mut import = Import::new(file)
+        .subdomains(subdomains.map_or(Subdomains::Auto, Subdomains::Exactly))
+        .settings(settings.settings(&token, Some(&board)))
+        .existing(if replace { Existing::Replace } else { Existing::Keep })
+        .verify(verify);
+    if let Some(name) = parts {
+        import = import.part_field(name);
+    }
+    if let Some(name) = regions {
+        import = import.region_field(name);
+    }
+    let listener = Listener { board: &board, callable: callable.as_ref() };
+    let work = || import.create_reported(&path).map_err(Failure::from);
     watched(py, &token, Some(&listener), work)
 }
 

@@ -94,7 +94,8 @@ fn neighbors_of(rows: &[TopologyRow]) -> NeighborCounts {
     neighbors
 }
 
-fn topology_row(neighbors: &NeighborCounts, name: u32) -> TopologyRow {
+/// The row of a subtree.
+pub fn topology_row(neighbors: &NeighborCounts, name: u32) -> TopologyRow {
     let of = neighbors.list(name).into_iter();
     TopologyRow {
         subdomain: name,

@@ -17,3 +17,4 @@ pub use option_text::OptionsText;
 pub use options::{EmbedOutside, MeshOptions, Options, RunOptions, SizeFile, Subdomains, Trial};
 pub use recipe::{RECIPE, recipe_of, record_recipe};
 pub use regions::{OuterEmbedded, outer_embedded, refuse_outer};
+pub use subdomains::TETS_PER_SUBDOMAIN;

@@ -5,7 +5,7 @@ use super::Options;
 /// Most tetrahedra of a sub-domain where the number of sub-domains is automatic. All threads work within one, and a cut is work besides:
 /// 9.3 million tetrahedra in four take 1.2 times the processor time of one, with plenty of memory, and 1.3 times within 128 MiB. Smaller
 /// ones would be quicker to question and to saturate again, larger ones would not fit into the memory of a common machine.
-const TETS_PER_SUBDOMAIN: f64 = (10u64 << 20) as f64;
+pub const TETS_PER_SUBDOMAIN: f64 = (10u64 << 20) as f64;
 
 /// Number of sub-domains for a mesh of `tets` tetrahedra, and the requested number if that is larger.
 pub fn n_subdomains(tets: f64, options: &Options) -> (u32, Option<u32>) {

@@ -17,7 +17,7 @@ from ._errors import (
     TetdbError,
 )
 from ._fields import Fields, StoreField
-from ._mesh import Comparison, compare, mesh, open, resume, tetrahedralize
+from ._mesh import Comparison, compare, import_mesh, mesh, open, resume, tetrahedralize
 from ._native import __version__
 from ._options import Event
 from ._sizes import Box, Cylinder, Field, Function, InRegion, NearLabel, Sphere
@@ -60,6 +60,7 @@ __all__ = [
     "begin",
     "compare",
     "gather",
+    "import_mesh",
     "mesh",
     "open",
     "plan",

@@ -100,6 +100,7 @@ _CLASSES: dict[str, type[TetdbError]] = {
         "contradicting-orientation",
         "surface-changed",
         "bad-field",
+        "bad-mesh",
         "bad-seed",
         "sheet-outside",
         "wire-outside",

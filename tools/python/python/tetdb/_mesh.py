@@ -17,7 +17,7 @@ from ._sizes import Length, Size
 from ._store import Store
 from ._surface import Surface
 
-__all__ = ["Comparison", "compare", "mesh", "open", "resume", "tetrahedralize"]
+__all__ = ["Comparison", "compare", "import_mesh", "mesh", "open", "resume", "tetrahedralize"]
 
 
 def mesh(
@@ -170,6 +170,72 @@ def _create(
             listener("note", note, 0, None, "")
     _native.mesh(given._inner, where, job, settings, replace, bool(verify), coarse_only, listener)
     return where
+
+
+def import_mesh(
+    mesh: Any,
+    path: str | os.PathLike[str],
+    *,
+    subdomains: int | None = None,
+    part_field: str | None = None,
+    region_field: str | None = None,
+    memory: int | str | None = None,
+    threads: int | None = None,
+    progress: bool | Progress | None = None,
+    existing: str = "keep",
+    verify: bool = True,
+) -> Store:
+    """Takes over a tetrahedral mesh of another program into a new store and opens it.
+
+    No vertex moves, and every tetrahedron stays.
+
+    Parameters
+    ----------
+    mesh : path, or tuple of arrays
+        A file that ``tetdb import`` reads; or points (n, 3) and tetrahedra (m, 4), and if wanted a whole number for the region of each.
+    path : path
+        Folder of the store.
+    subdomains : int, optional
+        Number of sub-domains. Default: one for every ten million tetrahedra.
+    part_field, region_field : str, optional
+        Arrays of the file's cells that give sub-domains and regions.
+    memory, threads, progress, existing, verify
+        As for :func:`mesh`; a store that is there is replaced or refused.
+
+    Raises
+    ------
+    SurfaceError
+        A file that cannot be read, or a mesh that is not one of positive tetrahedra that share whole faces.
+
+    Examples
+    --------
+    >>> import tetdb, tempfile
+    >>> points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with tetdb.import_mesh((points, [[0, 1, 2, 3]]), folder + "/one.tetdb") as store:
+    ...         store.n_tets
+    1
+    """
+    where, settings = _path(path), _options.settings(memory, threads)
+    replace = _options.one_of(existing, ("keep", "replace"), "existing") == "replace"
+    how = (subdomains, part_field, region_field)
+    listener = _options.listener(progress)
+    if isinstance(mesh, (str, os.PathLike)):
+        _native.import_mesh(_path(mesh), where, how, settings, replace, bool(verify), listener)
+        return Store(where, memory=memory, threads=threads)
+    if not isinstance(mesh, (tuple, list)) or len(mesh) not in (2, 3):
+        raise _options.usage("expected a path, or points and tetrahedra as arrays", "mesh")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, array, kind in zip(
+            ("points", "tets", "region"), mesh, (np.float64, np.int64, np.int64)
+        ):
+            given = np.asarray(array)
+            if kind is np.int64 and not np.issubdtype(given.dtype, np.integer):
+                raise _options.usage(f"{name}: expected whole numbers, found {given.dtype}", "mesh")
+            np.save(os.path.join(folder, f"arrays_{name}.npy"), np.ascontiguousarray(given, kind))
+        file = os.path.join(folder, "arrays.npy")
+        _native.import_mesh(file, where, how, settings, replace, bool(verify), listener)
+    return Store(where, memory=memory, threads=threads)
 
 
 def resume(

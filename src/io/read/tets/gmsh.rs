@@ -1,0 +1,28 @@
+//! Meshes in Gmsh files, `.msh` of versions 1, 2, 4.0 and 4.1. The sections are those that surfaces are read from.
+
+use std::io::BufRead;
+
+use super::gmsh_sink::TetSink;
+use super::raw::{NodeNumbers, RawMesh};
+use super::{Feed, Result};
+use crate::read::SurfaceSink;
+use crate::read::gmsh::GmshReader;
+use crate::read::volume_cells::VolumeCells;
+use tetdb_base::geom::counted;
+use tetdb_base::surface::SurfaceBuilder;
+
+/// Reads a file. With `has_parts`, partitions are parts.
+pub fn read<R: BufRead>(feed: Feed<R>, has_parts: bool, mesh: &mut RawMesh) -> Result<()> {
+    let mut builder = SurfaceBuilder::new();
+    let (stem, cells) = (mesh.stem.clone(), VolumeCells::default());
+    let mut none = SurfaceSink { builder: &mut builder, stem, prefix: None, cells };
+    let mut reader = GmshReader::open(feed, &mut none)?;
+    let nodes = NodeNumbers::default();
+    reader.tets = Some(TetSink { mesh, nodes, has_parts, last: None, n_repeated: 0 });
+    reader.read_sections()?;
+    if let Some(TetSink { mesh, n_repeated: n @ 1.., .. }) = reader.tets {
+        let text = "[tetrahedron is listed for several groups and belongs|tetrahedra are listed for several groups and belong] to the first";
+        mesh.notes.push(counted(n, text));
+    }
+    Ok(())
+}

@@ -1,0 +1,120 @@
+//! Meshes in arrays of NumPy, as the exports write them: `NAME_points.npy`, `NAME_tets.npy`, and where they are there `NAME_region.npy`,
+//! `NAME_subdomain.npy`, `NAME_triangles.npy` and `NAME_label.npy`.
+
+use std::path::{Path, PathBuf};
+
+use super::numbers::{Coding, Layout, Numbers};
+use super::{FilePlace, MeshFields, RawMesh, ReadFault, Result};
+use crate::read::error::Spot;
+use crate::read::feed::check_point;
+use crate::read::lengths::{ArrayFile, sides_of};
+use tetdb_base::geom::Point;
+
+/// The file of tetrahedra of a mesh that is named by one of its arrays, or by their common beginning.
+pub fn tets_file(path: &Path) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let base = ["_points", "_tets"].iter().find_map(|end| stem.strip_suffix(end)).unwrap_or(&stem);
+    path.with_file_name(format!("{base}_tets.npy"))
+}
+
+pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
+    let tets = tets_file(path);
+    let stem = tets.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let base = stem.trim_end_matches("_tets.npy").to_owned();
+    mesh.stem.clone_from(&base);
+    let beside = |name: &str| tets.with_file_name(format!("{base}_{name}.npy"));
+    let (n_points, mut points) = array(&beside("points"), 3)?;
+    for _ in 0..n_points {
+        let p = Point::new(points.real()?, points.real()?, points.real()?);
+        check_point(p, points.place())?;
+        mesh.point(p);
+    }
+    let (n, mut corners) = array(&tets, 4)?;
+    let column = |name: Option<&str>, default: &str, n: u64| -> Result<Option<Numbers>> {
+        let path = beside(name.unwrap_or(default));
+        if name.is_none() && (default.is_empty() || !path.is_file()) {
+            return Ok(None);
+        }
+        let (found, numbers) = array(&path, 1)?;
+        match found == n {
+            true => Ok(Some(numbers)),
+            false => Err(FilePlace::new(&path).refuse(ReadFault::CountMismatch {
+                what: "numbers in an array",
+                declared: found.to_string(),
+                found: format!("{n} elements"),
+            })),
+        }
+    };
+    let mut regions = column(fields.region, "region", n)?;
+    let mut parts = column(fields.part, "", n)?;
+    let next = |list: &mut Option<Numbers>| list.as_mut().map_or(Ok(0), Numbers::integer);
+    for _ in 0..n {
+        let four = [(); 4].map(|()| vertex(&mut corners, n_points));
+        let [a, b, c, d] = four;
+        let region = mesh.regions.number(next(&mut regions)?);
+        let part = match &mut parts {
+            Some(parts) => mesh.parts.number(parts.integer()?),
+            None => 0,
+        };
+        let taken = mesh.tet([a?, b?, c?, d?], region, part);
+        taken.map_err(|fault| corners.place().refuse(fault))?;
+    }
+    let triangles = beside("triangles");
+    if triangles.is_file() {
+        let (n, mut corners) = array(&triangles, 3)?;
+        let mut labels = column(None, "label", n)?;
+        for _ in 0..n {
+            let [a, b, c] = [(); 3].map(|()| vertex(&mut corners, n_points));
+            let corners = [a?, b?, c?];
+            let label = mesh.labels.number(next(&mut labels)?);
+            mesh.triangle(corners, label);
+        }
+    }
+    Ok(())
+}
+
+fn vertex(corners: &mut Numbers, n: u64) -> Result<u32> {
+    let v = corners.integer()?;
+    let known = u64::try_from(v).ok().filter(|&v| v < n);
+    known.map(|v| v as u32).ok_or_else(|| {
+        let (low, high) = (0, n as i64 - 1);
+        corners.place().refuse(ReadFault::IndexOutOfRange { index: v, low, high })
+    })
+}
+
+/// The number of rows of an array of so many columns, and its numbers. Errors: another shape or type.
+fn array(path: &Path, columns: u64) -> Result<(u64, Numbers)> {
+    let mut file = ArrayFile::open(path)?;
+    let (kind, is_by_rows, shape) = file.head_words()?;
+    let sides: Vec<u64> = sides_of(&shape).iter().filter_map(|side| side.parse().ok()).collect();
+    let rows = match sides[..] {
+        [n] if columns == 1 => n,
+        [n, k] if k == columns && (is_by_rows || columns == 1) => n,
+        _ => {
+            let expected = format!("rows of {columns} numbers in C order");
+            let found = format!("an array of shape {shape}");
+            return Err(file.unexpected(Spot::Byte(8), &expected, found));
+        }
+    };
+    let word = match kind.trim_start_matches(['<', '>', '=', '|']) {
+        "i1" => "Int8",
+        "u1" => "UInt8",
+        "i2" => "Int16",
+        "u2" => "UInt16",
+        "i4" => "Int32",
+        "u4" => "UInt32",
+        "i8" => "Int64",
+        "u8" => "UInt64",
+        "f4" => "Float32",
+        "f8" => "Float64",
+        _ => return Err(file.unexpected(Spot::Byte(8), "an array of numbers", kind)),
+    };
+    let is_big = kind.starts_with('>');
+    let layout = Layout { is_big, header: 0, is_packed: false, block_max: 0 };
+    let at = file.taken();
+    let open = std::fs::File::open(path)
+        .map_err(|e| FilePlace::new(path).refuse(ReadFault::Unreadable(e.to_string())))?;
+    let name = path.to_string_lossy();
+    let what = "the numbers of an array";
+    Ok((rows, Numbers::binary(&name, open, at, word, (Coding::Raw, layout), what)?))
+}

@@ -1,0 +1,327 @@
+//! Meshes in VTK's XML files of unstructured grids, `.vtu`: arrays as text, base64 or appended, plain or packed with zlib.
+//!
+//! A first pass finds the places of the arrays; then those that matter are read side by side, each through a buffer.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+use super::numbers::{Coding, Layout, Numbers};
+use super::{FilePlace, MeshFields, RawMesh, ReadError, ReadFault, Result};
+use crate::read::error::Spot;
+use crate::read::feed::{check_point, quote};
+use crate::read::open::{open_plain, unpacked_name};
+use crate::read::xml::Tag;
+use tetdb_base::geom::{Point, counted};
+
+/// Longest tag that is read.
+const TAG_MAX: u64 = 1 << 16;
+
+/// An array of a piece.
+struct ArrayAt {
+    section: String,
+    name: String,
+    kind: String,
+    n_components: usize,
+    format: String,
+    /// Byte behind its tag, or its place in the appended data.
+    at: u64,
+}
+
+#[derive(Default)]
+struct Piece {
+    n_points: u64,
+    n_cells: u64,
+    arrays: Vec<ArrayAt>,
+}
+
+struct Grid {
+    name: String,
+    path: std::path::PathBuf,
+    layout: Layout,
+    appended: Option<(u64, Coding)>,
+    pieces: Vec<Piece>,
+}
+
+pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
+    let grid = Grid::open(path, mesh.space.cap() / 16)?;
+    let (mut first, mut n_ghosts) = (0, 0);
+    for piece in &grid.pieces {
+        grid.points(piece, mesh)?;
+        n_ghosts += grid.cells(piece, first, fields, mesh)?;
+        first += piece.n_points;
+    }
+    let mut left_out: Vec<&str> = Vec::new();
+    for array in grid.pieces.iter().flat_map(|piece| &piece.arrays) {
+        let name = array.name.as_str();
+        let is_taken =
+            [fields.region, fields.part, Some("region"), Some("label")].contains(&Some(name));
+        let is_values = ["PointData", "CellData"].contains(&array.section.as_str());
+        if is_values && !is_taken && name != "vtkGhostType" && !left_out.contains(&name) {
+            left_out.push(name);
+        }
+    }
+    if !left_out.is_empty() {
+        mesh.notes.push(format!("arrays of values were left out: {}", left_out.join(", ")));
+    }
+    if n_ghosts > 0 {
+        let text = "[cell is a copy of one in another piece and was|cells are copies of those in other pieces and were] left out";
+        mesh.notes.push(counted(n_ghosts, text));
+    }
+    Ok(())
+}
+
+impl Grid {
+    fn refuse(&self, at: u64, fault: ReadFault) -> ReadError {
+        FilePlace { file: self.name.clone(), spot: Spot::Byte(at) }.refuse(fault)
+    }
+
+    fn open(path: &Path, block_max: u64) -> Result<Self> {
+        if unpacked_name(path) != path {
+            let what = "a packed .vtu, which is read at several places at once,".to_owned();
+            return Err(FilePlace::new(path).refuse(ReadFault::Unsupported(what)));
+        }
+        let (mut file, _) = open_plain(path)?;
+        let mut grid = Self {
+            name: path.to_string_lossy().into_owned(),
+            path: path.to_owned(),
+            layout: Layout { is_big: false, header: 4, is_packed: false, block_max },
+            appended: None,
+            pieces: Vec::new(),
+        };
+        let (mut at, mut sections, mut is_vtk) = (0, Vec::<String>::new(), false);
+        while let Some(text) = next_tag(&mut file, &mut at) {
+            let Some(tag) = Tag::next(&text, 0) else { continue };
+            match (tag.name, tag.is_end) {
+                ("VTKFile", false) => {
+                    is_vtk = true;
+                    grid.head(&tag, at)?;
+                }
+                ("Piece", false) => {
+                    let n = |key| tag.get(key).and_then(|n| n.trim().parse().ok());
+                    let (n_points, n_cells) = (n("NumberOfPoints"), n("NumberOfCells"));
+                    let (Some(n_points), Some(n_cells)) = (n_points, n_cells) else {
+                        return Err(grid.expected(at, "NumberOfPoints and NumberOfCells"));
+                    };
+                    grid.pieces.push(Piece { n_points, n_cells, arrays: Vec::new() });
+                }
+                ("AppendedData", false) => {
+                    let mut skipped = Vec::new();
+                    let n = file.read_until(b'_', &mut skipped).unwrap_or(0) as u64;
+                    if skipped.last() != Some(&b'_') {
+                        return Err(grid.expected(at, "`_` before appended data"));
+                    }
+                    let coding = match tag.get("encoding") {
+                        Some("base64") => Coding::Base64,
+                        _ => Coding::Raw,
+                    };
+                    grid.appended = Some((at + n, coding));
+                    break;
+                }
+                ("DataArray", false) => {
+                    if let (Some(section), Some(piece)) = (sections.last(), grid.pieces.last_mut())
+                    {
+                        let text = |key| tag.get(key).unwrap_or_default().to_owned();
+                        let offset = tag.get("offset").and_then(|n| n.parse().ok());
+                        let array = ArrayAt {
+                            section: section.clone(),
+                            name: text("Name"),
+                            kind: text("type"),
+                            n_components: text("NumberOfComponents").parse().unwrap_or(1),
+                            format: text("format"),
+                            at: offset.unwrap_or(at),
+                        };
+                        piece.arrays.push(array);
+                    }
+                }
+                (name, false) if !tag.is_empty => sections.push(name.to_owned()),
+                (name, true) if sections.last().is_some_and(|s| s == name) => drop(sections.pop()),
+                _ => {}
+            }
+        }
+        match is_vtk {
+            true => Ok(grid),
+            false => Err(grid.expected(0, "a tag `VTKFile`")),
+        }
+    }
+
+    fn expected(&self, at: u64, what: &str) -> ReadError {
+        let (expected, found) = (what.to_owned(), "something else".to_owned());
+        self.refuse(at, ReadFault::Unexpected { expected, found })
+    }
+
+    fn head(&mut self, tag: &Tag, at: u64) -> Result<()> {
+        let unsupported = |grid: &Self, what| Err(grid.refuse(at, ReadFault::Unsupported(what)));
+        self.layout.is_big = tag.get("byte_order") == Some("BigEndian");
+        self.layout.header = if tag.get("header_type") == Some("UInt64") { 8 } else { 4 };
+        let compressor = tag.get("compressor");
+        self.layout.is_packed = compressor.is_some();
+        let kind = tag.get("type").unwrap_or_default();
+        if kind != "UnstructuredGrid" {
+            return unsupported(self, format!("a VTK file of type {}", quote(kind.as_bytes())));
+        }
+        match compressor.filter(|name| *name != "vtkZLibDataCompressor") {
+            Some(other) => unsupported(self, format!("data packed by {}", quote(other.as_bytes()))),
+            None => Ok(()),
+        }
+    }
+
+    fn numbers(&self, array: &ArrayAt, what: &'static str) -> Result<Numbers> {
+        let file = File::open(&self.path)
+            .map_err(|e| self.refuse(0, ReadFault::Unreadable(e.to_string())))?;
+        let (at, coding) = match (array.format.as_str(), self.appended) {
+            ("ascii" | "", _) => return Numbers::text(&self.name, file, array.at, what),
+            ("binary", _) => (array.at, Coding::Base64),
+            ("appended", Some((start, coding))) => (start.saturating_add(array.at), coding),
+            _ => return Err(self.expected(array.at, "a format of an array that is known")),
+        };
+        Numbers::binary(&self.name, file, at, &array.kind, (coding, self.layout), what)
+    }
+
+    fn points(&self, piece: &Piece, mesh: &mut RawMesh) -> Result<()> {
+        if piece.n_points == 0 {
+            return Ok(());
+        }
+        let array = piece.arrays.iter().find(|a| a.section == "Points");
+        let array = array.ok_or_else(|| self.expected(0, "an array of points"))?;
+        if array.n_components != 3 {
+            return Err(self.expected(array.at, "points of three coordinates"));
+        }
+        let mut numbers = self.numbers(array, "a coordinate")?;
+        for _ in 0..piece.n_points {
+            let p = Point::new(numbers.real()?, numbers.real()?, numbers.real()?);
+            check_point(p, numbers.place())?;
+            mesh.point(p);
+        }
+        Ok(())
+    }
+
+    fn cell_array(
+        &self,
+        piece: &Piece,
+        name: Option<&str>,
+        what: &'static str,
+    ) -> Result<Option<Numbers>> {
+        let Some(name) = name else { return Ok(None) };
+        let cells = || piece.arrays.iter().filter(|a| a.section == "CellData");
+        match cells().find(|a| a.name == name) {
+            Some(array) if array.n_components <= 1 => self.numbers(array, what).map(Some),
+            Some(array) => Err(self.expected(array.at, "one number for each cell")),
+            None => {
+                let names: Vec<&str> = cells().map(|a| a.name.as_str()).collect();
+                let expected = format!("an array {name:?} of the cells");
+                let found = format!("the arrays {names:?}");
+                Err(self.refuse(0, ReadFault::Unexpected { expected, found }))
+            }
+        }
+    }
+
+    /// Reads the cells of a piece; returns how many are copies.
+    fn cells(
+        &self,
+        piece: &Piece,
+        first: u64,
+        fields: MeshFields,
+        mesh: &mut RawMesh,
+    ) -> Result<u64> {
+        if piece.n_cells == 0 {
+            return Ok(0);
+        }
+        let array = |name: &str, what| {
+            let array = piece.arrays.iter().find(|a| a.section == "Cells" && a.name == name);
+            self.numbers(array.ok_or_else(|| self.expected(0, what))?, what)
+        };
+        let mut types = array("types", "the types of cells")?;
+        let mut ends = array("offsets", "the offsets of cells")?;
+        let mut vertices = array("connectivity", "the vertices of cells")?;
+        let has =
+            |name: &&str| piece.arrays.iter().any(|a| a.section == "CellData" && a.name == *name);
+        let region = fields.region.or(Some("region").filter(has));
+        let mut regions = self.cell_array(piece, region, "the region of a cell")?;
+        let mut parts = self.cell_array(piece, fields.part, "the part of a cell")?;
+        let mut labels =
+            self.cell_array(piece, Some("label").filter(has), "the label of a cell")?;
+        let ghost = Some("vtkGhostType").filter(has);
+        let mut ghosts = self.cell_array(piece, ghost, "the kind of a copied cell")?;
+        let (mut from, mut n_ghosts) = (0, 0);
+        let next = |list: &mut Option<Numbers>| list.as_mut().map_or(Ok(0), Numbers::integer);
+        for cell in 0..piece.n_cells {
+            let (kind, end) = (types.integer()?, ends.integer()?);
+            let mut corners = [0; 4];
+            let n = end.checked_sub(from).filter(|n| (0..=1 << 20).contains(n));
+            let n = n.ok_or_else(|| self.expected(0, "offsets of cells that rise"))?;
+            from = end;
+            for k in 0..n as usize {
+                let v = vertices.integer()?;
+                let known = u64::try_from(v).ok().filter(|&v| v < piece.n_points);
+                let Some(v) = known else {
+                    let (low, high) = (0, piece.n_points as i64 - 1);
+                    let fault = ReadFault::IndexOutOfRange { index: v, low, high };
+                    return Err(vertices.place().refuse(fault));
+                };
+                if let Some(corner) = corners.get_mut(k) {
+                    *corner = (v + first) as u32;
+                }
+            }
+            let (region, part) = (next(&mut regions)?, next(&mut parts)?);
+            let (label, ghost) = (next(&mut labels)?, next(&mut ghosts)?);
+            if ghost & 1 != 0 {
+                n_ghosts += 1;
+                continue;
+            }
+            let [a, b, c, _] = corners;
+            match (kind, n) {
+                (10, 4) | (24, 10) | (71, 4..) => {
+                    mesh.n_curved += u64::from(n > 4);
+                    let region = mesh.regions.number(region);
+                    let part = if parts.is_some() { mesh.parts.number(part) } else { 0 };
+                    mesh.tet(corners, region, part).map_err(|fault| types.place().refuse(fault))?;
+                }
+                (5, 3) | (22, 6) | (69, 3..) => {
+                    mesh.n_curved += u64::from(n > 3);
+                    let label = if labels.is_some() { label } else { region };
+                    let label = mesh.labels.number(label);
+                    mesh.triangle([a, b, c], label);
+                }
+                (1..=4 | 21 | 35 | 68, _) => mesh.n_thin += 1,
+                _ => {
+                    let what = format!("cell {cell}, of type {kind} with {n} vertices,");
+                    return Err(types.place().refuse(ReadFault::Unsupported(what)));
+                }
+            }
+        }
+        Ok(n_ghosts)
+    }
+}
+
+/// The bytes of the next tag; `at` is moved behind it.
+fn next_tag(file: &mut BufReader<File>, at: &mut u64) -> Option<Vec<u8>> {
+    // Text between tags may be long.
+    loop {
+        let buffer = file.fill_buf().ok()?;
+        if buffer.is_empty() {
+            return None;
+        }
+        let start = buffer.iter().position(|&b| b == b'<');
+        let n = start.unwrap_or(buffer.len());
+        file.consume(n);
+        *at += n as u64;
+        if start.is_some() {
+            break;
+        }
+    }
+    let mut tag = Vec::new();
+    loop {
+        use std::io::Read;
+        let n = file.by_ref().take(TAG_MAX).read_until(b'>', &mut tag).ok()?;
+        *at += n as u64;
+        let is_open = tag.starts_with(b"<!--") && !tag.ends_with(b"-->");
+        let n_quotes = tag.iter().filter(|&&b| b == b'"').count();
+        if n == 0 || tag.len() as u64 > TAG_MAX {
+            return None;
+        }
+        if !is_open && (n_quotes % 2 == 0 || tag.starts_with(b"<!--")) {
+            return Some(tag);
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! `import`: meshes of other programs become stores.
+//!
+//! Why: an imported mesh must be the file's mesh to the last bit, and a bad one must not pass.
+//! How: exports of a store come back with its digest; small meshes with one fault each are refused with their place.
+
+use super::place::Place;
+
+const POINTS: &str = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 -1\n";
+/// Two tetrahedra on one another.
+const TWO: [&str; 2] = ["1 2 3 4", "1 3 2 5"];
+
+/// A text of MEDIT: vertices by lines, tetrahedra with a region each, triangles with a label.
+fn medit(points: &str, tets: &[&str], triangles: &[&str]) -> String {
+    let vertices: String = points.lines().map(|line| format!("{line} 0\n")).collect();
+    let mut text = format!(
+        "MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n{vertices}",
+        points.lines().count()
+    );
+    if !triangles.is_empty() {
+        let lines: String = triangles.iter().map(|t| format!("{t}\n")).collect();
+        text += &format!("Triangles\n{}\n{lines}", triangles.len());
+    }
+    let lines: String = tets.iter().map(|t| format!("{t} 1\n")).collect();
+    text + &format!("Tetrahedra\n{}\n{lines}End\n", tets.len())
+}
+
+/// A store of two regions.
+fn balls(place: &Place) -> String {
+    place
+        .run_line("mesh sample:balls,count=2,h=0.25 -o a.tetdb --regions all --no-verify")
+        .succeeds();
+    place.digest("a.tetdb")
+}
+
+#[test]
+fn every_export_comes_back_with_its_digest() {
+    let place = Place::new();
+    let digest = balls(&place);
+    for (file, options) in [
+        ("a.mesh", ""),
+        ("b.meshb", ""),
+        ("c.msh", ""),
+        ("d.msh", "--ascii"),
+        ("e.msh", "--format msh22"),
+        ("f.vtu", ""),
+        ("g.ele", ""),
+        ("h.inp", ""),
+        ("i.npy", ""),
+        ("j.vtu", "--order 2"),
+        ("k.msh", "--order 2"),
+    ] {
+        place.run_line(&format!("export a.tetdb {file} {options}")).succeeds();
+        let store = format!("{}.tetdb", &file[..1]);
+        let store = if store == "a.tetdb" { "z.tetdb".to_owned() } else { store };
+        place.run_line(&format!("import {file} -o {store} --memory 96MiB")).succeeds();
+        assert_eq!(place.digest(&store), digest, "{file} {options}");
+    }
+    place.run_line("verify c.tetdb --full").succeeds();
+    let info = place.run_line("info c.tetdb --json").succeeds().json();
+    let labels = place.run_line("info a.tetdb --json").succeeds().json()["labels"].clone();
+    assert_eq!(info["labels"], labels);
+    assert!(info.to_string().contains("imported:"), "{info}");
+}
+
+#[test]
+fn sub_domains_are_those_of_planes_or_of_the_file() {
+    let place = Place::new();
+    let line = "mesh sample:box,h=0.045 -o a.tetdb --subdomains 2 --no-verify";
+    place.run_line(line).succeeds();
+    place.run_line("export a.tetdb a.vtu a.msh a.npy").succeeds();
+    let digest = place.digest("a.tetdb");
+    for file in ["a.vtu", "a.msh", "a.npy"] {
+        let line = format!("import {file} -o b.tetdb --part-field subdomain --force");
+        place.run_line(&line).succeeds();
+        assert_eq!(place.digest("b.tetdb"), digest, "{file}");
+    }
+    for n in [1, 3, 7] {
+        place.run_line(&format!("import a.vtu -o b.tetdb --subdomains {n} --force")).succeeds();
+        place.run_line("verify b.tetdb --full").succeeds();
+        let one = place.digest("b.tetdb");
+        let line = format!(
+            "import a.vtu -o c.tetdb --subdomains {n} --threads 1 --memory 80MiB --force --no-verify"
+        );
+        place.run_line(&line).succeeds();
+        assert_eq!(place.digest("c.tetdb"), one);
+        let info = place.run_line("info b.tetdb --json").succeeds().json();
+        let parts = info["subdomains"].as_array().expect("a list");
+        let counts: Vec<u64> = parts.iter().filter_map(|part| part["tets"].as_u64()).collect();
+        let total: u64 = counts.iter().sum();
+        assert_eq!(counts.len(), n);
+        assert!(counts.iter().all(|&k| k + 1 >= total / n as u64), "{counts:?}");
+    }
+    place.run_line("query b.tetdb --point 0.5,0.5,0.5").succeeds();
+    place.run_line("export b.tetdb c.pvtu c.foam").succeeds();
+    place.run_line("snapshot b.tetdb b.png").succeeds();
+    place.run_line("report b.tetdb b.html").succeeds();
+    place.run_line("field b.tetdb add t --at vertices --from x").succeeds();
+    let error = place.run_line("resaturate b.tetdb --subdomain 1 --json").error();
+    assert_eq!(error["code"], "no-coarse-leaf");
+    assert!(error["message"].to_string().contains("imported"), "{error}");
+    place.run_line("resume b.tetdb --no-verify").succeeds();
+}
+
+#[test]
+fn what_is_changed_or_left_out_is_said() {
+    let turned = ["2 1 3 4", "3 1 2 5"];
+    let stray = format!("{POINTS}5 5 5\n");
+    let twice = format!("{POINTS}0 0 0\n");
+    for (text, note) in [
+        (medit(POINTS, &turned, &[]), "turned back"),
+        (medit(&stray, &TWO, &[]), "1 vertex belongs to no tetrahedron"),
+        (medit(&twice, &["1 2 3 4", "6 3 2 5"], &[]), "1 vertex repeats"),
+        (medit(POINTS, &TWO, &["1 4 5 7"]), "1 triangle is no face"),
+        (medit(POINTS, &TWO, &["1 1 2 7"]), "1 triangle is no face"),
+    ] {
+        let place = Place::new();
+        place.write("a.mesh", &text);
+        let done = place.run_line("import a.mesh").succeeds();
+        assert!(done.stderr().contains(note), "{note}: {}", done.stderr());
+        place.run_line("verify a.tetdb --full").succeeds();
+        let info = place.run_line("info a.tetdb --json").succeeds().json();
+        assert_eq!(info["tets"], 2);
+    }
+}
+
+#[test]
+fn labels_regions_and_sheets_are_taken_over() {
+    let place = Place::new();
+    let text = medit(POINTS, &TWO, &["1 2 3 8", "1 2 4 9"]);
+    place.write("a.mesh", &text);
+    place.run_line("import a.mesh --subdomains 2").succeeds();
+    place.run_line("verify a.tetdb --full").succeeds();
+    let info = place.run_line("info a.tetdb --json").succeeds().json();
+    let mut labels: Vec<String> = serde_json::from_value(info["labels"].clone()).expect("names");
+    labels.sort();
+    assert_eq!(labels, ["8", "9", "a"]);
+    let text = text.replace("1 3 2 5 1", "1 3 2 5 40");
+    place.write("b.mesh", &text);
+    place.run_line("import b.mesh --subdomains 2").succeeds();
+    let info = place.run_line("info b.tetdb --json").succeeds().json();
+    let filled =
+        info["regions"].as_array().expect("regions").iter().filter(|r| r["filled"] == true);
+    let numbers: Vec<u64> = filled.filter_map(|r| r["region"].as_u64()).collect();
+    assert_eq!(numbers, [1, 40]);
+}
+
+/// Meshes that are read and are no meshes.
+#[test]
+fn bad_meshes_are_refused_with_their_places() {
+    let six = format!("{POINTS}0.2 0.2 -3\n");
+    let flat = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n";
+    let nearly = "0 0 0\n1 0 0\n0 1 0\n0.25 0.25 1e-200\n";
+    let seven = format!("{POINTS}0.3 0.3 2\n1 1 1\n");
+    let many = |n: usize| vec!["1 2 3 4"; n];
+    for (text, place_of, words) in [
+        (medit(POINTS, &[], &[]), "a.mesh", "no tetrahedra"),
+        (medit("", &[], &[]), "a.mesh", "no tetrahedra"),
+        (medit(POINTS, &[], &["1 2 3 1"]), "a.mesh", "no tetrahedra"),
+        (medit(POINTS, &["1 2 3 4", "1 2 3 5"], &[]), "tetrahedron 2: (0, 0, 0)", "inside out"),
+        (medit(POINTS, &["1 3 2 4", "1 3 2 5"], &[]), "tetrahedron 1", "inside out"),
+        (medit(POINTS, &["1 2 3 3"], &[]), "tetrahedron 1", "one vertex twice"),
+        (medit(POINTS, &["1 2 3 4", "1 1 2 5"], &[]), "tetrahedron 2", "one vertex twice"),
+        (medit(POINTS, &["4 4 4 4"], &[]), "tetrahedron 1", "one vertex twice"),
+        (medit("0 0 0\n1 0 0\n0 1 0\n0 0 0\n", &["1 2 3 4"], &[]), "tetrahedron 1", "at one place"),
+        (
+            medit("0 0 0\n1 0 0\n0 1 0\n-0 0 -0\n", &["1 2 3 4"], &[]),
+            "tetrahedron 1",
+            "at one place",
+        ),
+        (medit(flat, &["1 2 3 4"], &[]), "tetrahedron 1", "no volume"),
+        (medit("0 0 0\n1 1 1\n2 2 2\n3 3 3\n", &["1 2 3 4"], &[]), "tetrahedron 1", "no volume"),
+        (
+            medit(&format!("{POINTS}1 1 0\n"), &["1 2 3 4", "1 2 3 6"], &[]),
+            "tetrahedron 2",
+            "no volume",
+        ),
+        (medit(&six, &["1 2 3 4", "1 3 2 5", "1 3 2 6"], &[]), "tetrahedron", "one side of a face"),
+        (medit(POINTS, &many(2), &[]), "tetrahedron", "one side of a face"),
+        (medit(POINTS, &many(3), &[]), "tetrahedron", "one side of a face"),
+        (medit(POINTS, &["1 2 3 4", "2 3 1 4"], &[]), "tetrahedron", "one side of a face"),
+        (medit(&seven, &["1 2 3 4", "1 2 3 6"], &[]), "tetrahedron", "one side of a face"),
+        (
+            medit(&six, &["1 2 3 4", "1 3 2 5", "1 3 2 6"], &["1 2 3 4"]),
+            "tetrahedron",
+            "one side of a face",
+        ),
+        (
+            medit(POINTS, &many(2), &["1 2 3 4", "1 2 4 4", "2 3 4 4", "1 3 4 4"]),
+            "tetrahedron",
+            "one side of a face",
+        ),
+    ] {
+        let place = Place::new();
+        place.write("a.mesh", &text);
+        let done = place.run_line("import a.mesh --json");
+        let error = done.error();
+        let found = format!("{error}\n{text}");
+        assert_eq!((done.exit(), &error["code"]), (Some(3), &"bad-mesh".into()), "{found}");
+        assert!(error["message"].to_string().contains(words), "{words}: {found}");
+        assert!(error["where"].to_string().contains(place_of), "{place_of}: {found}");
+        assert!(error["help"].is_string(), "{found}");
+        assert_eq!(place.names().len(), 1, "nothing is left: {:?}", place.names());
+    }
+    // Exact: a volume of 1e-200 / 6 is positive.
+    let place = Place::new();
+    place.write("a.mesh", medit(nearly, &["1 2 3 4"], &[]));
+    place.run_line("import a.mesh --no-verify").succeeds();
+}
+
+#[test]
+fn a_store_that_is_there_is_kept_or_replaced() {
+    let place = Place::new();
+    place.write("a.mesh", medit(POINTS, &TWO, &[]));
+    place.run_line("import a.mesh").succeeds();
+    let error = place.run_line("import a.mesh --json").error();
+    assert_eq!(error["code"], "store-exists");
+    place.write("a.mesh", medit(POINTS, &TWO[..1], &[]));
+    place.run_line("import a.mesh --force").succeeds();
+    let info = place.run_line("info a.tetdb --json").succeeds().json();
+    assert_eq!(info["tets"], 1);
+    // A bad mesh leaves the old store as it was.
+    place.write("a.mesh", medit(POINTS, &["1 2 3 3"], &[]));
+    assert_eq!(place.run_line("import a.mesh --force").exit(), Some(3));
+    place.run_line("verify a.tetdb").succeeds();
+}
+
+/// What an import that was killed leaves is no store, and the next one removes it.
+#[test]
+fn an_interrupted_import_leaves_no_store() {
+    let place = Place::new();
+    place.run_line("mesh sample:box,h=0.06 -o a.tetdb --no-verify").succeeds();
+    place.run_line("export a.tetdb a.meshb").succeeds();
+    for milliseconds in [5, 20, 40, 60, 80, 110, 150, 200, 300] {
+        let mut child = place
+            .command(&["import", "a.meshb", "-o", "b.tetdb", "--force", "--no-verify"])
+            .spawn()
+            .expect("the program starts");
+        std::thread::sleep(std::time::Duration::from_millis(milliseconds));
+        let _ = child.kill();
+        let _ = child.wait();
+        if place.path("b.tetdb").exists() {
+            place.run_line("verify b.tetdb").succeeds();
+        }
+    }
+    place.run_line("import a.meshb -o b.tetdb --force").succeeds();
+    assert!(!place.names().iter().any(|name| name.contains("being-")), "{:?}", place.names());
+}
