@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::TETS_MAX;
 use super::field::Field;
 use crate::mesh::anatomy::EDGES;
 use crate::mesh::{Mesh, dense, sparse};
@@ -10,12 +9,12 @@ use crate::sizing::TETS_PER_LOAD;
 use tetdb_base::geom::{Point, mix, orient};
 use tetdb_base::storage::{Pages, parallel, spare_threads};
 
+/// Most tetrahedra that a mesh has ids for. What is predicted to have more is not begun: its blocks would have no bound.
+pub(super) const TETS_MAX: f64 = (1 << 30) as f64;
 /// A coarse tetrahedron worth more is halved.
 const WEIGHT_MAX: f64 = 8.0;
-/// Share of what the part holds so far that one of its samples may have, so that their number is bounded.
-const SHARE_MAX: f64 = 1.0 / 20_000.0;
-/// Halvings at most. Where the wanted length is tiny at a point alone, each of its octaves takes three.
-const DEPTH_MAX: u32 = 90;
+/// Halvings at most.
+const DEPTH_MAX: u32 = 18;
 /// Tetrahedra sampled as one part, and parts sampled at once.
 const PART: usize = 4096;
 const PARTS: usize = 16;
@@ -67,9 +66,9 @@ impl Samples {
     fn add(&mut self, tets: &[([Point; 4], f64)], field: &Field) {
         let part = |tets: &[([Point; 4], f64)]| {
             let mut samples = Vec::new();
-            let (mut open, mut sum) = (Vec::new(), 0.0);
+            let mut open = Vec::new();
             for &(corners, mean) in tets {
-                add((corners, mean), field, &mut open, &mut samples, &mut sum);
+                add(corners, mean, field, &mut open, &mut samples);
             }
             samples
         };
@@ -92,13 +91,12 @@ impl Samples {
     }
 }
 
-/// Adds samples of a tetrahedron with the mean of the lengths at its corners. `open` is scratch, `sum` the load of the part so far.
 fn add(
-    (corners, mean): ([Point; 4], f64),
+    corners: [Point; 4],
+    mean: f64,
     field: &Field,
     open: &mut Vec<([Point; 4], u32)>,
     samples: &mut Vec<Sample>,
-    sum: &mut f64,
 ) {
     let volume = |[a, b, c, d]: [Point; 4]| orient(a, b, c, d) / 6.0 * TETS_PER_LOAD;
     let center = |[a, b, c, d]: [Point; 4]| (a + b + c + d) * 0.25;
@@ -110,11 +108,6 @@ fn add(
     }
     open.push((corners, 0));
     while let Some((q, depth)) = open.pop() {
-        if *sum > TETS_MAX {
-            // More than the mesh may have; the caller refuses it.
-            open.clear();
-            return;
-        }
         let at = center(q);
         let length = (field.h)(at);
         if field.place.is_partial() && !field.place.reaches(&q, &[length as f32; 4]) {
@@ -123,9 +116,8 @@ fn add(
             continue;
         }
         let weight = volume(q) / (length * length * length);
-        if weight <= WEIGHT_MAX.max(*sum * SHARE_MAX) || depth == DEPTH_MAX {
+        if weight <= WEIGHT_MAX || depth == DEPTH_MAX {
             samples.push(Sample { at, weight: weight as f32 });
-            *sum += weight;
             continue;
         }
         let length = |&[i, j]: &[usize; 2]| (q[i] - q[j]).length_squared();

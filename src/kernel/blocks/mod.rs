@@ -36,7 +36,7 @@ use crate::optimize::{Mode, OperationCounts};
 use brick::Bricks;
 use divide::Divider;
 pub use field::Field;
-use partition::{BLOCK_TETS, KdPartition};
+use partition::{KdPartition, TOO_STEEP};
 pub use placement::{Everywhere, PlacementRule};
 use region::Region;
 pub use report::RefineReport;
@@ -84,7 +84,7 @@ pub fn saturate<P: Pages>(
     scaffold += scaffold::build(mesh, field);
     let partition = KdPartition::new(load::sample(mesh, field), field.bounds, field.h);
     let n_bricks = partition.n_bricks();
-    if partition.load() > TETS_MAX {
+    if partition.load() > load::TETS_MAX {
         raise(StorageError::TooMany { what: "tetrahedra" });
     }
     let memory = Memory::of(mesh, &partition);
@@ -247,11 +247,10 @@ struct Memory {
     threads: usize,
 }
 
-/// Most tetrahedra that a mesh has ids for. What is predicted to have more is not begun: its blocks would have no bound.
-const TETS_MAX: f64 = (1 << 30) as f64;
-/// Bytes of a visit of a block of the usual size: arrays of a region with its margin, and its bricks twice. In large sub-domains blocks are
-/// larger, since their number is bounded.
+/// Bytes of a visit, and per predicted tetrahedron of a large region: its arrays, and its bricks twice. Regions are large in large
+/// sub-domains, since the number of blocks is bounded, and where lengths change steeply.
 const VISIT_BYTES: u64 = 16 << 20;
+const VISIT_TET_BYTES: f64 = 160.0;
 /// Bytes of bricks per predicted tetrahedron.
 const TET_BYTES: u64 = 50;
 
@@ -263,8 +262,10 @@ impl Memory {
             return Self { bricks: usize::MAX, pages: u64::MAX, pages_at_first: u64::MAX, threads };
         };
         let load = partition.load();
-        let largest = partition.blocks.iter().map(|b| b.load).fold(BLOCK_TETS, f64::max);
-        let visit = (VISIT_BYTES as f64 * (largest / BLOCK_TETS)) as u64;
+        let visit = VISIT_BYTES.max((partition.largest_region() * VISIT_TET_BYTES) as u64);
+        if visit / 8 > most {
+            raise(StorageError::Budget { what: TOO_STEEP, needed: visit, available: most });
+        }
         let wanted = (1.5 * load) as u64 * TET_BYTES;
         if used + 2 * wanted + threads as u64 * visit <= most {
             return Self { bricks: usize::MAX, pages: most, pages_at_first: most, threads };

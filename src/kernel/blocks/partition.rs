@@ -6,9 +6,10 @@
 
 use super::load::Sample;
 use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::storage::{StorageError, raise};
 
 /// Tetrahedra of a block when it is finished.
-pub(super) const BLOCK_TETS: f64 = 32_000.0;
+const BLOCK_TETS: f64 = 32_000.0;
 /// A mesh is divided into at least so many blocks, unless these were smaller than [`BLOCK_TETS_MIN`].
 const BLOCKS_MIN: f64 = 60.0;
 const BLOCK_TETS_MIN: f64 = 6_000.0;
@@ -19,6 +20,11 @@ const BRICKS: f64 = 64.0;
 const BRICK_TETS_MIN: f64 = 250.0;
 /// Width of the margin in wanted lengths: of division, and of smoothing with the rounds.
 pub(super) const MARGINS: [f64; 2] = [3.0, 2.0];
+/// Bricks listed in all regions at most: a hundred times as many as usual.
+const LISTED_MAX: usize = 1 << 26;
+/// The use of memory that is too large where lengths grow so steeply that regions overlap everywhere.
+pub(super) const TOO_STEEP: &str =
+    "a part of the mesh and its surroundings, for lengths change steeply there";
 /// Bins of the histogram that finds a weighted median.
 const BINS: usize = 1024;
 /// Orders in which the blocks are colored; the best counts.
@@ -91,9 +97,15 @@ impl KdPartition {
         }
         partition.boxes = vec![(Aabb::EMPTY, 0.0); partition.branches.len()];
         partition.find_boxes(partition.root);
+        let mut n_listed = 0;
         for (kind, margin) in MARGINS.into_iter().enumerate() {
             for id in 0..partition.blocks.len() {
                 let region = partition.around(id as u32, margin);
+                n_listed += region.len();
+                if n_listed > LISTED_MAX {
+                    let [needed, available] = [n_listed, LISTED_MAX].map(|n| 4 * n as u64);
+                    raise(StorageError::Budget { what: TOO_STEEP, needed, available });
+                }
                 partition.blocks[id].regions[kind] = region;
             }
             partition.find_conflicts(kind);
@@ -104,6 +116,16 @@ impl KdPartition {
 
     pub fn n_bricks(&self) -> usize {
         self.bricks.len()
+    }
+
+    /// Predicted tetrahedra of the largest region.
+    pub fn largest_region(&self) -> f64 {
+        let load = |b: u32| {
+            let block = &self.blocks[self.owner(b) as usize];
+            block.load / block.bricks.len() as f64
+        };
+        let regions = self.blocks.iter().flat_map(|block| &block.regions);
+        regions.map(|region| region.iter().map(|&b| load(b)).sum()).fold(0.0, f64::max)
     }
 
     /// Predicted tetrahedra of all blocks.

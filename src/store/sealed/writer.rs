@@ -33,8 +33,12 @@ pub struct Sealed {
     pub interfaces: Vec<InterfaceSide>,
 }
 
-/// Tetrahedra taken at once: some chunks, 6 MB.
+/// Tetrahedra taken at once, at most: some chunks, 6 MB.
 const TETS_AT_ONCE: usize = 4 * SealedTet::COUNT_MAX;
+/// Least memory with which chunks are summed up side by side: each has a table of 4 MB.
+const PARALLEL_BYTES: usize = 64 << 20;
+/// Bytes of a tetrahedron that is taken, and of its place in the table of faces.
+const TET_BYTES: usize = 128;
 
 /// Writes one sub-domain, once.
 ///
@@ -202,7 +206,14 @@ impl SealedWriter {
         let (io, rank) = (self.io(), self.subdomain.rank());
         let (taken, before) = (std::mem::take(&mut self.taken), std::mem::take(&mut self.packed));
         let (cutter, pairs) = (&mut self.tets, &mut self.pairs);
-        let take = || tets.take(TETS_AT_ONCE).collect::<Result<Vec<_>, E>>();
+        let at_once = (self.memory_bytes / 8 / TET_BYTES).clamp(1 << 12, TETS_AT_ONCE);
+        let take = || {
+            let mut taken = Vec::with_capacity(at_once);
+            for tet in tets.take(at_once) {
+                taken.push(tet?);
+            }
+            Ok::<_, E>(taken)
+        };
         let pack = || {
             let mut packed = Vec::new();
             for (tet, place) in taken {
@@ -212,9 +223,10 @@ impl SealedWriter {
             Ok::<_, std::io::Error>(packed)
         };
         let cache = self.cache.as_mut().expect("vertices have ended");
+        let has_room = self.memory_bytes >= PARALLEL_BYTES;
         let (file, scratch, known) = (&mut self.file, &mut self.scratch, self.totals.cosines);
         let sum_up = || {
-            if let Some(sums) = sum_in_parallel(&before, rank, known, cache, file)? {
+            if has_room && let Some(sums) = sum_in_parallel(&before, rank, known, cache, file)? {
                 return Ok(sums);
             }
             let sums = before.iter().map(|cut| {
