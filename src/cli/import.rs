@@ -29,6 +29,11 @@ pub fn run(args: &ImportArgs, console: &Console) -> Result<u8, Failure> {
 
 /// The store that is written.
 pub(super) fn output(args: &ImportArgs) -> PathBuf {
-    let name = || Path::new(&args.mesh).file_stem().map_or("mesh".into(), PathBuf::from);
-    args.output.clone().unwrap_or_else(|| name().with_extension("tetdb"))
+    // `part.1.ele` is not `part.2.ele`: only one ending goes.
+    let name = || {
+        let mut name = Path::new(&args.mesh).file_stem().unwrap_or("mesh".as_ref()).to_owned();
+        name.push(".tetdb");
+        PathBuf::from(name)
+    };
+    args.output.clone().unwrap_or_else(name)
 }

@@ -58,8 +58,8 @@ pub enum Command {
     Mesh(Box<MeshArgs>),
     /// Take over a tetrahedral mesh that another program made
     ///
-    /// The mesh is checked and changed in nothing: each tetrahedron positive, faces shared as wholes. The store is finished, and `query`,
-    /// `verify`, `export` and all else that needs no surface work on it.
+    /// The mesh is checked: each tetrahedron positive, faces shared as wholes. No vertex moves; vertices at one place are joined, unused
+    /// ones left out. The store is finished: `query`, `verify`, `export` and all else that needs no coarse mesh work on it.
     Import(ImportArgs),
     /// Predict a mesh and the memory, disk and time it takes, without meshing
     ///

@@ -9,7 +9,7 @@ use crate::sizing::TETS_PER_LOAD;
 use tetdb_base::geom::{Point, mix, orient};
 use tetdb_base::storage::{Pages, parallel, spare_threads};
 
-/// Most tetrahedra that a mesh has ids for. What is predicted to have more is not begun: its blocks would have no bound.
+/// Most tetrahedra that a mesh has ids for. What is predicted to have more is not divided: its blocks would have no bound.
 pub(super) const TETS_MAX: f64 = (1 << 30) as f64;
 /// A coarse tetrahedron worth more is halved.
 const WEIGHT_MAX: f64 = 8.0;

@@ -22,9 +22,9 @@ const BRICK_TETS_MIN: f64 = 250.0;
 pub(super) const MARGINS: [f64; 2] = [3.0, 2.0];
 /// Bricks listed in all regions at most: a hundred times as many as usual.
 const LISTED_MAX: usize = 1 << 26;
-/// The use of memory that is too large where lengths grow so steeply that regions overlap everywhere.
+/// What memory is too small for if regions overlap everywhere.
 pub(super) const TOO_STEEP: &str =
-    "a part of the mesh and its surroundings, for lengths change steeply there";
+    "a part of the mesh where wanted lengths change steeply, with its surroundings,";
 /// Bins of the histogram that finds a weighted median.
 const BINS: usize = 1024;
 /// Orders in which the blocks are colored; the best counts.

@@ -19,7 +19,7 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    /// A batch that fits redb's cache, half of `memory_bytes`.
+    /// A batch that fits redb's cache ([`cache_bytes`]).
     pub(super) fn new(memory_bytes: usize) -> Self {
         Self { values: Vec::new(), bytes: 0, bytes_max: (memory_bytes / 6).min(BATCH_BYTES_MAX) }
     }

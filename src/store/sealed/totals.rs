@@ -173,7 +173,10 @@ impl SubdomainTotals {
         let [least, most] = self.cosines;
         self.cosines = [least.min(sums.cosines[0]), most.max(sums.cosines[1])];
         // Volumes one after another: a sum does not depend on chunks.
-        let mut run = RegionRun::begin(tets[0].region, &self.regions);
+        let Some(tet) = tets.first() else {
+            return;
+        };
+        let mut run = RegionRun::begin(tet.region, &self.regions);
         for (tet, &volume) in tets.iter().zip(&sums.volumes) {
             self.volume += volume;
             if run.region != tet.region {

@@ -44,7 +44,7 @@ const TET_BYTES: usize = 128;
 ///
 /// Order of calls: all vertices, all tetrahedra, then facets and interface faces. The file holds
 /// nothing that counts until [`SealedWriter::finish`] returns and the catalog lists it.
-/// Memory: about the bytes given, for redb's cache, the batch and decoded vertices.
+/// Memory: about the bytes given, for redb's cache, the batch, tetrahedra in work and decoded vertices.
 pub struct SealedWriter {
     path: DiskPath,
     file: StoreFile,
@@ -196,7 +196,7 @@ impl SealedWriter {
     /// Adds some thousands of tetrahedra, rotated ([`SealedTet::rotated`]), each with the data that only a working page keeps. The number of
     /// each is its place in the stream.
     ///
-    /// Some are taken while those before are packed, and those before these summed up, each on a thread of its own. The file is smallest when they come sorted by their nodes.
+    /// One thread takes tetrahedra, another packs those taken before, and others sum up what was packed before. The file is smallest when they come sorted by their nodes.
     /// Errors: those of `tets`; the disk; a vertex that was not pushed.
     pub fn push_tets<E: From<SealedError> + Send>(
         &mut self,

@@ -144,13 +144,15 @@ pub fn region_numbers(groups: &Groups, used: &BTreeSet<u32>) -> (Vec<u32>, Vec<(
     let keeps = order.iter().all(|&g| (1..REGION_MAX).contains(&group(g).0));
     let mut rank = vec![0; used.last().map_or(0, |last| *last as usize + 1)];
     let mut regions = Vec::new();
+    let is_one = order.len() == 1;
     for (k, g) in (1..).zip(order) {
         let (number, name) = group(g);
         let region = if keeps { *number as u32 } else { k };
         rank[g as usize] = region;
         let default = format!("region_{region}");
         let name = match name.as_str() {
-            "" if *number != 0 => format!("region_{number}"),
+            // Where numbers change, that of the file is the name, so that no two regions have one.
+            "" if *number != 0 || !(keeps || is_one) => format!("region_{number}"),
             name => name.to_owned(),
         };
         regions.push((region, if name == default { String::new() } else { name }));

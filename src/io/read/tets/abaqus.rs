@@ -97,6 +97,11 @@ impl Deck<'_> {
             "*NODE" | "*ELEMENT" | "*ELSET" if options.contains_key("INPUT") => {
                 return Err(unsupported(place, "data in a file of its own (INPUT)"));
             }
+            "*NODE" if options.get("SYSTEM").is_some_and(|s| !s.eq_ignore_ascii_case("R")) => {
+                return Err(unsupported(place, "coordinates that are not rectangular (SYSTEM)"));
+            }
+            // Programs keep the sides of surfaces in such sets.
+            "*ELSET" if options.contains_key("INTERNAL") => self.keyword.clear(),
             "*ELEMENT" => {
                 self.kind = value("TYPE").to_ascii_uppercase();
                 self.group = self.mesh.regions.named(&value("ELSET"));
@@ -206,7 +211,10 @@ impl Deck<'_> {
             let mut number = first;
             while number <= last && number - first < 1 << 31 {
                 self.put(number, feed);
-                number += step;
+                let Some(next) = number.checked_add(step) else {
+                    break;
+                };
+                number = next;
             }
             return Ok(());
         }

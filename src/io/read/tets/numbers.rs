@@ -81,8 +81,26 @@ pub struct Numbers {
 }
 
 enum From {
-    Text(Box<Feed<BufReader<File>>>),
+    Text(Box<Feed<BufReader<ToTag>>>),
     Binary(Box<Binary>),
+}
+
+/// A file to its next `<`: an array must not take the numbers of the one behind it.
+struct ToTag {
+    file: File,
+    is_over: bool,
+}
+
+impl Read for ToTag {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        if self.is_over {
+            return Ok(0);
+        }
+        let n = self.file.read(bytes)?;
+        let text = bytes[..n].iter().position(|&b| b == b'<');
+        self.is_over = text.is_some();
+        Ok(text.unwrap_or(n))
+    }
 }
 
 struct Binary {
@@ -110,8 +128,9 @@ impl Numbers {
             Ok(len)
         });
         let len = len.map_err(|e| place.refuse(ReadFault::Unreadable(e.to_string())))?;
-        let mut feed = Feed::new(name, BufReader::with_capacity(BUFFER_BYTES, file), len);
-        (feed.at.offset, feed.at.is_binary, feed.comment) = (at, true, Some(b'<'));
+        let text = ToTag { file, is_over: false };
+        let mut feed = Feed::new(name, BufReader::with_capacity(BUFFER_BYTES, text), len);
+        (feed.at.offset, feed.at.is_binary) = (at, true);
         Ok(Self { place, from: From::Text(Box::new(feed)), what })
     }
 
