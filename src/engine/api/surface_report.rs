@@ -157,7 +157,7 @@ impl<'a> SurfaceReport<'a> {
         self.tets_expected.map(|tets| n / tets)
     }
 
-    /// Whether the shapes of the triangles spoil many tetrahedra.
+    /// Whether many tetrahedra will be bad because of the shapes of the triangles.
     pub fn is_poorly_shaped(&self) -> bool {
         self.fitness.small_angle_share > POOR_SHARE
             || self.forced_share().is_some_and(|share| share > POOR_SHARE)

@@ -22,7 +22,7 @@ const BRICK_TETS_MIN: f64 = 250.0;
 pub(super) const MARGINS: [f64; 2] = [3.0, 2.0];
 /// Bricks listed in all regions at most: a hundred times as many as usual.
 const LISTED_MAX: usize = 1 << 26;
-/// What memory is too small for if regions overlap everywhere.
+/// The use of memory in the error for regions that overlap everywhere.
 pub(super) const TOO_STEEP: &str =
     "a part of the mesh where wanted lengths change steeply, with its surroundings,";
 /// Bins of the histogram that finds a weighted median.

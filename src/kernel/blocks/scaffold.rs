@@ -22,7 +22,7 @@ const LONG: f64 = 2.0;
 const FILTER: f64 = 0.75;
 /// Rounds at most: each halves what is long.
 const ROUNDS_MAX: u32 = 30;
-/// Pages of tetrahedra asked before marks are set.
+/// Pages of tetrahedra scanned before their marks are set.
 const BATCH: usize = 256;
 /// Levels of random order in the first round: its points come from cavities that would grow without.
 const LEVELS: u64 = 7;
@@ -91,7 +91,7 @@ pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
 /// A tetrahedron, its point, and the length wanted there.
 type Wanted = (u32, Point, f64);
 
-/// The points that tetrahedra want which were not asked before.
+/// The points of long tetrahedra that were not examined before. Effects: they are marked as examined.
 fn wanted<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<Wanted> {
     let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
     let mut found = Vec::new();
@@ -104,7 +104,7 @@ fn wanted<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<Wanted> {
     found
 }
 
-/// Scan that returns which tetrahedra of a page were not asked before, and what they want.
+/// Scan that returns the tetrahedra of a page that were not examined before, and the points of those that are long.
 struct Long<'a, 'b>(&'a Field<'b>);
 
 impl Scan for Long<'_, '_> {

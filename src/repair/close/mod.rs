@@ -42,7 +42,7 @@ const LISTED_MAX: usize = 16;
 /// Holes listed in words.
 const LISTED: usize = 3;
 
-/// What [`close`] did. Serialized, it is the key `winding` of `tetdb check --json`.
+/// Report of [`close`]. Serialized, it is the key `winding` of `tetdb check --json`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct CloseReport {
@@ -68,7 +68,7 @@ pub struct CloseReport {
     pub volume: f64,
     /// Volume with a winding number between 0.3 and 0.7, where the choice is open to doubt.
     pub volume_doubtful: f64,
-    /// What was done to crossings first.
+    /// Report of the resolution of crossings, which comes first.
     pub resolve: Resolved,
 }
 

@@ -36,7 +36,7 @@ pub struct Placed {
     pub surface: Surface,
     /// Number and name of each region.
     pub regions: Vec<(u32, String)>,
-    /// What was left out or changed.
+    /// Notes for the user: vertices left out or joined, tetrahedra turned.
     pub notes: Vec<String>,
     pub(super) points: SpillVec<[f64; 3]>,
     /// Four vertices, region, sub-domain.

@@ -31,7 +31,7 @@ use tetdb_store::store::{Catalog, INPUT_TRIANGLES};
 /// Generation of the files.
 const GENERATION: u32 = 1;
 
-/// What one face of an interface is called.
+/// The numbers that name a face of an interface.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct InCut {

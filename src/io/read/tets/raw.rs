@@ -78,7 +78,7 @@ impl Groups {
     }
 
     /// The position of the group of this name, which is added if new. `region_12` has number 12, others come behind all numbers.
-    /// What has no name has number 0.
+    /// The group without a name has number 0.
     pub fn named(&mut self, name: &str) -> u32 {
         if name.is_empty() {
             return self.with_name(0, String::new);
