@@ -80,6 +80,8 @@ impl From<StorageError> for Error {
             StorageError::NoMemory { .. } => Self::new(code, &e).with_help(
                 "end other programs, or raise the limit of this process; with a smaller memory cap more goes to the disk",
             ),
+            StorageError::TooMany { .. } => Self::new(code, &e)
+                .with_help("ask for longer edges, or divide the mesh into more sub-domains"),
             _ => with_general_help(code, &e),
         }
     }

@@ -5,7 +5,7 @@
 //! wanted lengths long; the pieces then have a closed form.
 
 use crate::mesh::Mesh;
-use crate::sizing::load_of_tet;
+use crate::sizing::density_of_tet;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{Pages, check_cancelled, for_each_mut};
 
@@ -13,8 +13,6 @@ use tetdb_base::storage::{Pages, check_cancelled, for_each_mut};
 const EDGE_MAX: f64 = 5.0;
 /// Largest ratio of sizes at the corners of a piece that is longer than [`EDGE_FINE`].
 const RATIO_MAX: f64 = 1.5;
-/// Below this ratio the closed form is replaced by its second order: two parts in a thousand off at most, five times as fast.
-const SECOND_ORDER: f64 = 1.25;
 /// A piece with less load than this (ten tetrahedra) is not divided, however long: coarse tetrahedra span the domain and are thin,
 /// and dividing them all to the last took half of a bisection.
 const LOAD_MIN: f64 = 1.0;
@@ -104,14 +102,9 @@ fn divide(tet: Sized4, h: &SizeFn, stack: &mut Vec<Sized4>, visit: &mut impl FnM
                 continue;
             }
         }
-        let mean = sizes.iter().sum::<f64>() * 0.25;
-        let density = if most < SECOND_ORDER * least {
-            let spread: f64 = sizes.iter().map(|h| (h - mean) * (h - mean)).sum();
-            (1.0 + 0.3 * spread / (mean * mean)) / (mean * mean * mean)
-        } else {
-            load_of_tet(1.0, sizes)
-        };
-        visit(&TetPiece { points, load: density * volume.max(0.0), h: mean });
+        let load = density_of_tet(sizes) * volume.max(0.0);
+        let h = sizes.iter().sum::<f64>() * 0.25;
+        visit(&TetPiece { points, load, h });
     }
 }
 

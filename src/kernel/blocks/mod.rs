@@ -75,19 +75,27 @@ pub fn saturate<P: Pages>(
     dir: &DiskPath,
     progress: &mut dyn FnMut(u64),
 ) -> BlockReport {
+    saturate_at(mesh, field, (mode, true), dir, progress)
+}
+
+/// Likewise; if it `is_final`, nothing is left that could be divided.
+fn saturate_at<P: Pages>(
+    mesh: &mut Mesh<P>,
+    field: &Field,
+    (mode, is_final): (Mode, bool),
+    dir: &DiskPath,
+    progress: &mut dyn FnMut(u64),
+) -> BlockReport {
+    let load = load::predict(mesh, field);
+    load::check(load.tets);
     let mut scaffold = 0;
-    if !field.place.is_partial() {
-        let in_voids = scaffold::tets_in_voids(mesh, field);
-        if in_voids > COARSE_TETS.max(f64::from(mesh.n_tets())) {
-            scaffold += saturate_coarser(mesh, field, dir);
-        }
+    if !field.place.is_partial() && load.in_voids > COARSE_TETS.max(f64::from(mesh.n_tets())) {
+        scaffold += saturate_coarser(mesh, field, dir);
     }
     scaffold += scaffold::build(mesh, field);
     let partition = KdPartition::new(load::sample(mesh, field), field.bounds, field.h);
+    load::check(partition.load());
     let n_bricks = partition.n_bricks();
-    if partition.load() > load::TETS_MAX {
-        raise(StorageError::TooMany { what: "tetrahedra" });
-    }
     let memory = Memory::of(mesh, &partition);
     let bricks = Bricks::new(n_bricks, memory.bricks / 2, Some(dir.clone()));
     mesh.pages_mut().use_at_most(memory.pages_at_first);
@@ -114,7 +122,8 @@ pub fn saturate<P: Pages>(
     graph.run(memory.threads, &Visitor::new, &visit, &mut || {
         progress(visits.inserted.load(Ordering::Relaxed))
     });
-    let unexamined = visits.finish_rest();
+    // Shorter lengths divide what coarser ones leave.
+    let unexamined = if is_final { visits.finish_rest() } else { 0 };
     visits.bricks.limit(memory.bricks / 2);
     mesh.pages_mut().use_at_most(memory.pages_at_first);
     let over_constrained = convert::to_pages(&visits.bricks, n_bricks as u32, mesh);
@@ -136,12 +145,12 @@ fn saturate_coarser<P: Pages>(mesh: &mut Mesh<P>, field: &Field, dir: &DiskPath)
     }
     let h = |p| COARSER * (field.h)(p);
     let coarser = Field { h: &h, place: field.place, bounds: field.bounds };
-    let made = saturate(mesh, &coarser, Mode::None, dir, &mut |_| ()).refine.inserted;
+    let made = saturate_at(mesh, &coarser, (Mode::None, false), dir, &mut |_| ());
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, (field.h)(p) as f32);
     }
-    made
+    made.refine.inserted
 }
 
 /// All that visits share.
@@ -171,7 +180,8 @@ impl Visits<'_, '_> {
     fn visit(&self, visitor: &mut Visitor, phase: usize, id: usize) {
         let block = &self.partition.blocks[id];
         let numbers = &block.regions[phase];
-        self.within(visitor, block, numbers, |visitor, is_own, own| {
+        let is_own = |b| block.bricks.contains(&b);
+        self.within(visitor, numbers, is_own, |visitor, is_own, own| {
             let color = |b: u32| self.partition.blocks[self.partition.owner(b) as usize].color;
             // What a block could not do, for want of margin, those do that come later.
             let is_due: Vec<bool> = (numbers.iter().zip(is_own))
@@ -196,14 +206,14 @@ impl Visits<'_, '_> {
     fn within(
         &self,
         visitor: &mut Visitor,
-        block: &partition::Block,
         numbers: &[u32],
+        is_own: impl Fn(u32) -> bool,
         work: impl FnOnce(&mut Visitor, &[bool], u32),
     ) {
         let bricks = self.bricks.get_all(numbers);
         visitor.region.check_out(numbers, bricks, &mut |n| self.bricks.get(n));
-        let own = numbers.partition_point(|&b| b < block.bricks.start) as u32;
-        let is_own: Vec<bool> = numbers.iter().map(|b| block.bricks.contains(b)).collect();
+        let is_own: Vec<bool> = numbers.iter().map(|&b| is_own(b)).collect();
+        let own = is_own.iter().position(|&own| own).expect("its own bricks are among them") as u32;
         work(visitor, &is_own, own);
         debug_assert!(visitor.region.mesh.is_sound());
         let made = visitor.region.check_in(own);
@@ -214,13 +224,18 @@ impl Visits<'_, '_> {
     fn finish_rest(&self) -> u64 {
         let mut visitor = Visitor::new();
         for margin in WIDER_MARGINS {
-            for (id, block) in (0u32..).zip(&self.partition.blocks) {
-                if self.n_unexamined(block) > 0 {
-                    let numbers = self.partition.around(id, margin);
-                    self.within(&mut visitor, block, &numbers, |visitor, is_own, own| {
-                        self.divide(visitor, is_own, own);
-                    });
+            for block in &self.partition.blocks {
+                let left: Vec<u32> =
+                    block.bricks.clone().filter(|&b| self.bricks.get(b).unexamined > 0).collect();
+                if left.is_empty() {
+                    continue;
                 }
+                let bounds = self.partition.bounds_of(&left);
+                let is_left = |b: u32| left.binary_search(&b).is_ok();
+                let numbers = self.partition.around(&bounds, is_left, margin);
+                self.within(&mut visitor, &numbers, is_left, |visitor, is_own, own| {
+                    self.divide(visitor, is_own, own);
+                });
             }
         }
         self.partition.blocks.iter().map(|block| self.n_unexamined(block)).sum()

@@ -100,7 +100,8 @@ impl KdPartition {
         let mut n_listed = 0;
         for (kind, margin) in MARGINS.into_iter().enumerate() {
             for id in 0..partition.blocks.len() {
-                let region = partition.around(id as u32, margin);
+                let block = &partition.blocks[id];
+                let region = partition.around(&block.bounds, |b| block.bricks.contains(&b), margin);
                 n_listed += region.len();
                 if n_listed > LISTED_MAX {
                     let [needed, available] = [n_listed, LISTED_MAX].map(|n| 4 * n as u64);
@@ -223,9 +224,14 @@ impl KdPartition {
         }
     }
 
-    /// The bricks of a block and those within `margin` lengths of it, which are the brick's; in ascending order.
-    pub fn around(&self, id: u32, margin: f64) -> Vec<u32> {
-        let block = &self.blocks[id as usize];
+    /// The box around the cells of some bricks.
+    pub fn bounds_of(&self, bricks: &[u32]) -> Aabb {
+        bricks.iter().fold(Aabb::EMPTY, |all, &b| all.union(self.bricks[b as usize].0))
+    }
+
+    /// The bricks that `is_own` and those within `margin` lengths of the box around them; a brick's length is that wanted in its middle. In ascending
+    /// order.
+    pub fn around(&self, own: &Aabb, is_own: impl Fn(u32) -> bool, margin: f64) -> Vec<u32> {
         let mut found = Vec::new();
         let mut open = vec![self.root];
         while let Some(node) = open.pop() {
@@ -233,8 +239,8 @@ impl KdPartition {
                 Node::Leaf(brick) => self.bricks[brick as usize],
                 Node::Branch(at) => self.boxes[at as usize],
             };
-            let is_own = matches!(node, Node::Leaf(b) if block.bricks.contains(&b));
-            if !is_own && gap(&block.bounds, &bounds) > margin * length {
+            let is_own = matches!(node, Node::Leaf(b) if is_own(b));
+            if !is_own && gap(own, &bounds) > margin * length {
                 continue;
             }
             match node {
@@ -256,13 +262,16 @@ impl KdPartition {
                 blocks_of[brick as usize].push(id);
             }
         }
-        for id in 0..self.blocks.len() {
-            let block = &mut self.blocks[id];
+        let mut seen_by = vec![u32::MAX; self.blocks.len()];
+        for (id, block) in (0u32..).zip(&mut self.blocks) {
+            seen_by[id as usize] = id;
             let others = block.regions[kind].iter().flat_map(|&b| &blocks_of[b as usize]);
-            let mut conflicts: Vec<u32> =
-                others.copied().filter(|&other| other as usize != id).collect();
+            let mut conflicts: Vec<u32> = others
+                .copied()
+                .filter(|&other| std::mem::replace(&mut seen_by[other as usize], id) != id)
+                .collect();
             conflicts.sort_unstable();
-            conflicts.dedup();
+            conflicts.shrink_to_fit();
             block.conflicts[kind] = conflicts;
         }
     }

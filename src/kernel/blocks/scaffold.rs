@@ -8,7 +8,6 @@ use crate::delaunay::Kernel;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGES, FACES, FROZEN, MARK};
 use crate::mesh::{Mesh, Scan, Tet, scan_parts, tets_of_page};
-use crate::sizing::TETS_PER_LOAD;
 use tetdb_base::geom::{HilbertFrame, Point, mix, orient};
 use tetdb_base::storage::{Pages, check_cancelled, kind};
 
@@ -123,33 +122,10 @@ impl Scan for Long<'_, '_> {
     }
 }
 
-/// Predicts how many tetrahedra of the scaffold's lengths will be where tetrahedra are too long for it now.
-pub(super) fn tets_in_voids<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> f64 {
-    let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
-    scan_parts(mesh, &pages, &Voids(field)).into_iter().sum()
-}
-
-/// Scan that predicts the tetrahedra in place of those of a page that are too long.
-struct Voids<'a, 'b>(&'a Field<'b>);
-
-impl Scan for Voids<'_, '_> {
-    type Part = u32;
-    type Output = f64;
-
-    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> f64 {
-        let mut sum = 0.0;
-        tets_of_page(mesh, page, |mesh, _, tet| {
-            let p = mesh.points(&tet);
-            let least =
-                mesh.ends(&tet).iter().map(|e| f64::from(e.h)).fold(f64::INFINITY, f64::min);
-            if longest(&p) > (LONG * COARSER * least).powi(2) {
-                let length = COARSER * (self.0.h)((p[0] + p[1] + p[2] + p[3]) * 0.25);
-                let volume = orient(p[0], p[1], p[2], p[3]) / 6.0;
-                sum += TETS_PER_LOAD * volume / (length * length * length);
-            }
-        });
-        sum
-    }
+/// Whether a tetrahedron is too long for the scaffold, by the lengths wanted at its corners.
+pub(super) fn is_void(corners: &[Point; 4], sizes: &[f64; 4]) -> bool {
+    let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+    longest(corners) > (LONG * COARSER * least).powi(2)
 }
 
 /// The square of the longest edge.

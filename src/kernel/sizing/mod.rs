@@ -51,7 +51,7 @@ mod values;
 mod tests;
 
 pub use background::{Background, BackgroundMesh};
-pub use closed::{TETS_PER_LOAD, load_of_tet, metric_length};
+pub use closed::{TETS_PER_LOAD, density_of_tet, load_of_tet, metric_length};
 pub use constraint::SizeConstraint;
 pub use count::TetCounts;
 pub use error::SizingError;
