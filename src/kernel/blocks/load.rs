@@ -141,14 +141,16 @@ impl Samples {
             samples
         };
         let parts: Vec<Self> = parallel(|| tets.par_chunks(PART).map(part).collect());
-        for part in parts {
-            while self.halvings < part.halvings {
-                self.halve();
-            }
-            for mut sample in part.kept {
-                sample.weight /= (1u64 << part.halvings) as f32;
-                self.add(sample);
-            }
+        parts.into_iter().for_each(|part| self.add_all(part));
+    }
+
+    fn add_all(&mut self, part: Self) {
+        while self.halvings < part.halvings {
+            self.halve();
+        }
+        for mut sample in part.kept {
+            sample.weight /= (1u64 << part.halvings) as f32;
+            self.add(sample);
         }
     }
 
@@ -218,5 +220,57 @@ fn for_each_piece(
         };
         open.push(half(i));
         open.push(half(j));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::placement::Everywhere;
+    use super::*;
+    use tetdb_base::geom::Aabb;
+
+    #[test]
+    fn most_of_the_load_lies_around_a_point_of_tiny_length() {
+        let (least, slope) = (1e-4, 0.26);
+        let h = |p: Point| least + slope * p.length();
+        let corners = [Point::ZERO, Point::X, Point::Y, Point::Z];
+        let bounds = Aabb::around(corners);
+        let field = Field { h: &h, place: &Everywhere, bounds };
+        // In the ball that touches the far face in closed form; h is above 0.15 beyond.
+        let x = slope / 3f64.sqrt() / least;
+        let radial = (1.0 + x).ln() + 2.0 / (1.0 + x) - 0.5 / (1.0 + x).powi(2) - 1.5;
+        let ball = std::f64::consts::FRAC_PI_2 * radial / slope.powi(3) * TETS_PER_LOAD;
+        let beyond = TETS_PER_LOAD * (1.0 / 6.0 - 0.1) / 0.15f64.powi(3);
+        for weight_max in [WEIGHT_MAX, PREDICTED_MAX] {
+            let mut sum = 0.0;
+            for_each_piece((corners, corners.map(h)), (&field, weight_max), &mut vec![], |s| {
+                sum += f64::from(s.weight);
+                true
+            });
+            assert!(sum > 0.95 * ball && sum < 1.05 * (ball + beyond), "{sum} for {ball}");
+        }
+    }
+
+    #[test]
+    fn samples_are_those_of_one_part_however_many_there_are() {
+        let h = |_: Point| 0.002;
+        let corners = [Point::ZERO, Point::X, Point::Y, Point::Z];
+        let field = Field { h: &h, place: &Everywhere, bounds: Aabb::around(corners) };
+        let tets: Vec<SizedTet> = (0..8)
+            .map(|i| (corners.map(|p| p * 0.1 + Point::X * f64::from(i)), [0.0008; 4]))
+            .collect();
+        let mut one = Samples::default();
+        one.add_tets(&tets, &field);
+        let mut several = Samples::default();
+        for part in tets.chunks(3) {
+            let mut samples = Samples::default();
+            samples.add_tets(part, &field);
+            several.add_all(samples);
+        }
+        assert!(one.halvings > 0, "{} are too few", one.kept.len());
+        let content = |s: &Samples| -> Vec<_> {
+            s.kept.iter().map(|s| (s.at.to_array().map(f64::to_bits), s.weight)).collect()
+        };
+        assert_eq!(content(&one), content(&several));
     }
 }
