@@ -23,14 +23,12 @@ for_target=(--target "$target") built=$targets/$target/$profile
 [ "$target" != "$host" ] || for_target=() built=$targets/$profile
 cargo build --profile "$profile" --locked --bin tetdb ${for_target[@]+"${for_target[@]}"}
 
-ending=
-case $target in *windows*) ending=.exe ;; esac
 name=tetdb-$target
 files=$targets/package-files
 rm -rf "$files"
 mkdir -p "$files/$name/man" "$files/$name/completions"
-cp "$built/tetdb$ending" "$files/$name/"
-program=$files/$name/tetdb$ending
+cp "$built/tetdb" "$files/$name/"
+program=$files/$name/tetdb
 "$program" man --dir "$files/$name/man" --quiet
 for shell in bash zsh fish powershell elvish; do
     "$program" completions $shell >"$files/$name/completions/tetdb.$shell"

@@ -14,32 +14,26 @@ export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 missing() { echo "wheel: $1"; exit 77; }
-# The Python of an environment, whose folder has another name on Windows.
-python_of() { if [ -d "$1/Scripts" ]; then echo "$1/Scripts"; else echo "$1/bin"; fi; }
 
-base=$(command -v python3 || command -v python) || missing "no Python 3"
-"$base" -m venv "$work/build" || missing "no Python 3 with venv"
-tools=$(python_of "$work/build")
+python3 -m venv "$work/build" || missing "no Python 3 with venv"
 maturin=maturin options=()
-if [ "$(uname -s)" = Linux ]; then
-    if [ "${ZIG:-1}" = 1 ]; then
-        maturin='maturin[zig]' options=(--zig --compatibility manylinux_2_28)
-    else
-        options=(--compatibility linux)
-    fi
+if [ "$(uname -s)" = Linux ] && [ "${ZIG:-1}" = 1 ]; then
+    maturin='maturin[zig]' options=(--zig --compatibility manylinux_2_28)
+elif [ "$(uname -s)" = Linux ]; then
+    options=(--compatibility linux)
 fi
-"$tools/python" -m pip install --quiet "$maturin>=1.9,<2" || missing "$maturin could not be installed"
-export PATH=$tools:$PATH
+"$work/build/bin/pip" install --quiet "$maturin>=1.9,<2" || missing "$maturin could not be installed"
+export PATH=$work/build/bin:$PATH
 
 rm -f "$out"/tetdb-*.tar.gz "$out"/tetdb-*.whl
 maturin sdist --out "$out" >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
-# Files of the archive have old dates; without them cargo takes no changed file for an unchanged one.
+# Files of the archive have an old date, by which cargo would take a changed file for an unchanged one; -m gives them today's.
 tar -x -m -z -f "$out"/tetdb-*.tar.gz -C "$work"
 (cd "$work"/tetdb-* && maturin build --quiet --profile "$profile" --locked ${options[@]+"${options[@]}"} --out "$out")
 
 # An empty environment, to which the wheel brings NumPy and nothing else: three lines give a mesh and a picture.
-"$base" -m venv "$work/empty"
-python=$(python_of "$work/empty")/python
+python3 -m venv "$work/empty"
+python=$work/empty/bin/python
 "$python" -m pip install --quiet "$out"/tetdb-*.whl
 cd "$work"
 "$python" -c '

@@ -1,7 +1,8 @@
-"""Writes the guide as sources of an mdBook: `book.py PROGRAM API FOLDER`.
+"""Writes the guide as sources of an mdBook: `book.py PROGRAM API FOLDER [python]`.
 
 PROGRAM is `tetdb`, whose help becomes a chapter. API is the folder of `cargo doc`, in which links to items are looked up; in the site
-it is `api`. The texts are those of the repository, and their order is that of the table in `src/guide/mod.rs`. Only links change.
+it is `api`. `python` adds a link to the reference of the Python module, in the folder `python` of the site. The texts are those of the
+repository, and their order is that of the table in `src/guide/mod.rs`. Only links change.
 """
 
 from __future__ import annotations
@@ -101,13 +102,13 @@ class Links:
 
 
 def front(text: str) -> str:
-    """The first page: what the README says, with commands beside its picture."""
+    """The first page: what the README says, with its picture beside its points."""
     intro, picture, rest = re.split(r"^(!\[.*?\]\(.*?\)\n\n\*.*?\*\n)", text, maxsplit=1, flags=re.MULTILINE | re.DOTALL)
     points, start = rest.split("\n## Start\n", 1)
     blocks = re.findall(r"^```console\n.*?^```\n", start, re.MULTILINE | re.DOTALL)
     table = start.split("\n## What you can do\n", 1)[1].split("\n## Licence\n")[0]
-    columns = f'<div class="front">\n<div>\n\n{blocks[-1]}\n{points}\n</div>\n<div>\n\n{picture}\n</div>\n</div>\n'
-    return f"{intro}{columns}\n[Build it and make a first mesh](start.md)\n\n## What you can do\n{table}"
+    columns = f'<div class="front">\n<div>\n\n{points}\n</div>\n<div class="picture">\n\n{picture}\n</div>\n</div>\n'
+    return f"{intro}{blocks[-1]}\n{columns}\n[Build it and make a first mesh](start.md)\n\n## What you can do\n{table}"
 
 
 def commands(program: str) -> str:
@@ -128,7 +129,7 @@ def title(text: str) -> str:
     return re.search(r"^# (.*)$", text, re.MULTILINE)[1]  # type: ignore[index]
 
 
-def main(program: str, api: str, folder: str) -> None:
+def main(program: str, api: str, folder: str, python: str = "") -> None:
     links, source = Links(Path(api)), Path(folder) / "src"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(GUIDE / "pictures", source / "pictures")
@@ -139,7 +140,8 @@ def main(program: str, api: str, folder: str) -> None:
     texts["index.md"] = front(texts["index.md"])
     texts["commands.md"] = commands(program)
     texts["rust.md"] = "# Rust reference\n\nThe [documentation of the crate](api/tetdb/index.html) has every type and function.\n"
-    texts["python-reference.md"] = "# Python reference\n\nThe [documentation of the module](python/tetdb.html) has every class and function.\n"
+    if python:
+        texts["python-reference.md"] = "# Python reference\n\nThe [documentation of the module](python/tetdb.html) has every class and function.\n"
     for name, text in texts.items():
         (source / name).write_text(text)
 
@@ -147,9 +149,9 @@ def main(program: str, api: str, folder: str) -> None:
         return f"- [{title(texts[name])}]({name})"
 
     guide = [entry(f"{name}.md") for name in chapters()]
-    reference = [entry(name) for name in ("commands.md", "rust.md", "python-reference.md", *OTHERS.values())]
-    summary = ["# Summary", "[tetdb](index.md)", "# Guide", *guide, "# Reference", *reference]
-    (source / "SUMMARY.md").write_text("\n\n".join(summary[:3]) + "\n\n" + "\n".join(guide) + "\n\n# Reference\n\n" + "\n".join(reference) + "\n")
+    reference = [entry(name) for name in ("commands.md", "rust.md", "python-reference.md", *OTHERS.values()) if name in texts]
+    lines = ["# Summary\n", "[tetdb](index.md)\n", "# Guide\n", *guide, "\n# Reference\n", *reference]
+    (source / "SUMMARY.md").write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 #
 # FOLDER gets the guide as a book with search, the documentation of the crate in `api`, and with WHEEL that of the Python module in
 # `python`. PROGRAM is `tetdb`, whose help is a chapter. Needs mdBook 0.5 (`cargo install mdbook`) and Python 3.11.
+# DOC, if it is set, names a folder of documentation that `cargo doc` made before.
 set -euo pipefail
 mkdir -p "$1"
 site=$(cd "$1" && pwd)
@@ -14,12 +15,13 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 command -v mdbook >/dev/null || { echo "site: mdBook is not installed: cargo install mdbook"; exit 77; }
 
+doc=${DOC:-$targets/site/doc}
 # In a folder of its own: other documentation in `target/doc` is no part of the site.
-RUSTDOCFLAGS="-D warnings" cargo doc --quiet --locked --no-deps -p tetdb -p tetdb-schema --target-dir "$targets/site"
-python3 tools/site/book.py "$program" "$targets/site/doc" "$work/book"
+[ -n "${DOC:-}" ] || RUSTDOCFLAGS="-D warnings" cargo doc --quiet --locked --no-deps -p tetdb -p tetdb-schema --target-dir "$targets/site"
+python3 tools/site/book.py "$program" "$doc" "$work/book" ${wheel:+python}
 rm -rf "$site"
 mdbook build --dest-dir "$site" "$work/book"
-cp -r "$targets/site/doc" "$site/api"
+cp -r "$doc" "$site/api"
 
 if [ -n "$wheel" ]; then
     python3 -m venv "$work/python"
