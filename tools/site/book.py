@@ -38,6 +38,10 @@ default-theme = "light"
 limit-results = 20
 use-boolean-and = true
 
+# The playground does not have the crate.
+[output.html.playground]
+runnable = false
+
 [output.html.print]
 enable = false
 """
