@@ -79,3 +79,30 @@ fn versions_addresses_and_words_are_the_same_everywhere() {
         }
     }
 }
+
+#[test]
+fn dependencies_come_from_crates_io() {
+    for path in ["Cargo.lock", "tools/python/Cargo.lock", "tests/outside/Cargo.lock"] {
+        let lock = table(path);
+        let packages = lock["package"].as_array().expect("a list");
+        let sources = packages.iter().filter_map(|package| package.get("source")?.as_str());
+        let sources: Vec<&str> = sources.collect();
+        assert!(sources.len() > 10, "{path}: {} packages", sources.len());
+        let index = "registry+https://github.com/rust-lang/crates.io-index";
+        assert!(sources.iter().all(|source| *source == index), "{path}: {sources:?}");
+    }
+}
+
+#[test]
+fn one_address_takes_reports() {
+    let package = table("Cargo.toml")["package"].clone();
+    let maintainer = package["metadata"]["deb"]["maintainer"].as_str().expect("a string");
+    let address = maintainer.split(['<', '>']).nth(1).expect("an address");
+    assert!(
+        read("SECURITY.md").contains(address),
+        "SECURITY.md has another address than {address}"
+    );
+    let private = read(".github/ISSUE_TEMPLATE/config.yml");
+    let repository = shared()["repository"].as_str().expect("a string").to_owned();
+    assert!(line(&private, "url:").starts_with(&repository), "{private}");
+}

@@ -5,29 +5,30 @@
 # tetdb-TARGET.tar.gz.sha256, and where `cargo deb` is installed a package for Debian and Ubuntu. TARGET is this machine's by default;
 # the program must run here, for it writes its manual pages itself. x86_64-unknown-linux-musl gives a program that needs no library of
 # the system; it needs `rustup target add x86_64-unknown-linux-musl` and musl-gcc (Debian's musl-tools).
+# PROGRAM, if it is set, names the program, built before.
 set -euo pipefail
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
-host=$(rustc -vV | sed -n 's/^host: //p')
-target=${2:-$host}
+target=${2:-$(rustc -vV | sed -n 's/^host: //p')}
 profile=${3:-release}
+program=${PROGRAM:+$(realpath "$PROGRAM")}
 cd "$(dirname "$0")/../.."
 targets=${CARGO_TARGET_DIR:-$PWD/target}
 
-if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$target/lib" ]; then
-    echo "Rust's standard library for $target is not installed: rustup target add $target"
-    exit 77
+if [ -z "$program" ]; then
+    if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$target/lib" ]; then
+        echo "Rust's standard library for $target is not installed: rustup target add $target"
+        exit 77
+    fi
+    cargo build --profile "$profile" --locked --bin tetdb --target "$target"
+    program=$targets/$target/$profile/tetdb
 fi
-# Without a target, cargo builds where all other commands do.
-for_target=(--target "$target") built=$targets/$target/$profile
-[ "$target" != "$host" ] || for_target=() built=$targets/$profile
-cargo build --profile "$profile" --locked --bin tetdb ${for_target[@]+"${for_target[@]}"}
 
 name=tetdb-$target
 files=$targets/package-files
 rm -rf "$files"
 mkdir -p "$files/$name/man" "$files/$name/completions"
-cp "$built/tetdb" "$files/$name/"
+cp "$program" "$files/$name/tetdb"
 program=$files/$name/tetdb
 "$program" man --dir "$files/$name/man" --quiet
 for shell in bash zsh fish powershell elvish; do

@@ -9,21 +9,22 @@ mkdir -p "$1"
 out=$(cd "$1" && pwd)
 profile=${2:-release}
 cd "$(dirname "$0")/../python"
-# Builds of an earlier call are used again, whatever folder the sources lie in.
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
+# At the same place in every call: cargo builds dependencies anew when its linker has another path.
+tools=$CARGO_TARGET_DIR/wheel-tools
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 missing() { echo "wheel: $1"; exit 77; }
 
-python3 -m venv "$work/build" || missing "no Python 3 with venv"
+[ -x "$tools/bin/python" ] || python3 -m venv "$tools" || missing "no Python 3 with venv"
 maturin=maturin options=()
 if [ "$(uname -s)" = Linux ] && [ "${ZIG:-1}" = 1 ]; then
     maturin='maturin[zig]' options=(--zig --compatibility manylinux_2_28)
 elif [ "$(uname -s)" = Linux ]; then
     options=(--compatibility linux)
 fi
-"$work/build/bin/pip" install --quiet "$maturin>=1.9,<2" || missing "$maturin could not be installed"
-export PATH=$work/build/bin:$PATH
+"$tools/bin/pip" install --quiet "$maturin>=1.9,<2" || missing "$maturin could not be installed"
+export PATH=$tools/bin:$PATH
 
 rm -f "$out"/tetdb-*.tar.gz "$out"/tetdb-*.whl
 maturin sdist --out "$out" >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
