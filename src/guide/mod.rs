@@ -17,6 +17,7 @@
 //! | [`scripting`] | JSON output, configuration files, shell completion |
 //! | [`library`] | the same from Rust |
 //! | [`python`] | the same from Python, in arrays |
+//! | [`stability`] | what a new version may change, and what stays the same |
 //! | [`errors`] | every error code, exit codes, what to do |
 
 /// Where the chapters' links lead here. In a chapter's file the same links lead to files; what comes first counts.
@@ -38,6 +39,7 @@ macro_rules! links {
             "[scripting]: crate::guide::scripting\n",
             "[library]: crate::guide::library\n",
             "[python]: crate::guide::python\n",
+            "[stability]: crate::guide::stability\n",
             "[errors]: crate::guide::errors\n",
             "[`Surface`]: crate::Surface\n",
             "[`Mesher`]: crate::Mesher\n",
@@ -111,6 +113,10 @@ pub mod library {
 pub mod python {
     #![doc = links!()]
     #![doc = include_str!("python.md")]
+}
+pub mod stability {
+    #![doc = links!()]
+    #![doc = include_str!("stability.md")]
 }
 pub mod errors {
     #![doc = links!()]

@@ -171,6 +171,7 @@ chapters! {
     scripting: 5,
     library: 0,
     python: 0,
+    stability: 0,
     errors: 2,
 }
 

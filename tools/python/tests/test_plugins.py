@@ -10,6 +10,17 @@ import pytest
 import tetdb
 
 
+def is_same_mesh(store: tetdb.Store, other: tetdb.Store) -> bool:
+    """Whether both have the same tetrahedra in the same regions, in whatever order."""
+
+    def rows(one: tetdb.Store) -> set[tuple[bytes, int]]:
+        mesh = one.merged()
+        corners = np.sort(mesh.points[mesh.tets].view("f8,f8,f8")[..., 0], axis=1)
+        return {(row.tobytes(), int(region)) for row, region in zip(corners, mesh.regions)}
+
+    return rows(store) == rows(other)
+
+
 def test_pyvista_reads_stores(parts: tetdb.Store) -> None:
     pyvista = pytest.importorskip("pyvista", minversion="0.48")
     grid = pyvista.read(parts.path)
@@ -18,6 +29,18 @@ def test_pyvista_reads_stores(parts: tetdb.Store) -> None:
     assert grid.volume == pytest.approx(1.0)
     with pytest.raises(FileNotFoundError):
         pyvista.read(str(Path(parts.path).parent / "none.tetdb"))
+
+
+def test_pyvista_writes_stores(parts: tetdb.Store, tmp_path: Path) -> None:
+    pyvista = pytest.importorskip("pyvista", minversion="0.48")
+    grid = pyvista.read(parts.path)
+    grid.save(str(tmp_path / "again.tetdb"))
+    with tetdb.open(tmp_path / "again.tetdb") as store:
+        assert is_same_mesh(store, parts)
+        assert [part.n_tets for part in store.subdomains] == [part.n_tets for part in parts.subdomains]
+    with pytest.raises(tetdb.TetdbError) as refused:
+        pyvista.ImageData(dimensions=(3, 3, 3)).cast_to_unstructured_grid().save(str(tmp_path / "cubes.tetdb"))
+    assert refused.value.code == "unsupported-content" and not (tmp_path / "cubes.tetdb").exists()
 
 
 def test_pyvista_surfaces_are_meshed(tmp_path: Path) -> None:
@@ -39,3 +62,11 @@ def test_meshio_reads_stores(parts: tetdb.Store) -> None:
     merged = parts.merged()
     assert np.array_equal(mesh.cells_dict["tetra"], merged.tets) and np.array_equal(mesh.points, merged.points)
     assert np.array_equal(mesh.cell_data["region"][0], merged.regions)
+
+
+def test_meshio_writes_stores(parts: tetdb.Store, tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    pytest.importorskip("tetdb.meshio")
+    meshio.read(parts.path).write(tmp_path / "again.tetdb")
+    with tetdb.open(tmp_path / "again.tetdb") as store:
+        assert is_same_mesh(store, parts) and len(store.subdomains) == len(parts.subdomains)

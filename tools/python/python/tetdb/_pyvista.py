@@ -1,4 +1,4 @@
-"""What PyVista finds by entry points: ``pyvista.read("part.tetdb")`` and ``surface.tetdb``."""
+"""What PyVista finds by entry points: ``pyvista.read("part.tetdb")``, ``grid.save("part.tetdb")`` and ``surface.tetdb``."""
 
 from __future__ import annotations
 
@@ -8,17 +8,30 @@ from typing import Any
 
 import pyvista
 
-from ._mesh import mesh
+from ._mesh import import_mesh, mesh
 from ._store import Store
 from ._surface import CheckReport, Estimate, Surface
 
-__all__ = ["Accessor", "read"]
+__all__ = ["Accessor", "read", "write"]
 
 
 def read(path: str, subdomain: int | list[int] | None = None, **options: Any) -> Any:
     """The tetrahedra of a finished store, or of some of its sub-domains; options are those of :class:`Store`."""
     with Store(path, **options) as store:
         return store.to_pyvista(subdomain)
+
+
+def write(dataset: Any, path: str, **options: Any) -> None:
+    """Takes a grid of tetrahedra over into a new store; options are those of :func:`tetdb.import_mesh`.
+
+    Cell data `region`, `subdomain` and, of triangles, `label` are kept; sub-domains unless `subdomains` gives another number.
+    """
+    if "subdomain" in dataset.cell_data and "subdomains" not in options:
+        options.setdefault("part_field", "subdomain")
+    with tempfile.TemporaryDirectory(prefix="tetdb-") as folder:
+        file = os.path.join(folder, "mesh.vtu")
+        dataset.cast_to_unstructured_grid().save(file)
+        import_mesh(file, path, **options).close()
 
 
 @pyvista.register_dataset_accessor("tetdb", pyvista.DataSet)
