@@ -38,7 +38,7 @@ pub use plan::{
 pub use progress::silent;
 pub use progress::{Event, Watcher};
 pub use remesh::{
-    Forecast, NewSizes, ResaturateSummary, Resaturated, Resaturation, Values, changed, forecast,
+    CarriedField, Forecast, NewSizes, ResaturateSummary, Resaturated, Resaturation, Values, changed, forecast,
     forget, recorded_request, resaturate, undo,
 };
 pub use tasks::serve;

@@ -38,4 +38,7 @@ pub use selection::{Selection, Sharing};
 pub use session::checked_chunk;
 pub use session::regions_called;
 pub use session::{Measures, QuerySession};
+pub(crate) use exact::Vector;
+pub(crate) use locate::{holds, shares};
+pub(crate) use session::{bounds_of, chunk_bounds};
 pub use solid::Solid;
