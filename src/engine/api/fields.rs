@@ -234,7 +234,11 @@ fn drop_values(catalog: &mut Catalog, field: &FieldRow) -> Result<(), Error> {
     })?)
 }
 
-pub(super) fn journal(state: tetdb_schema::catalog::StoreState, step: &str, clock: Instant) -> JournalRow {
+pub(super) fn journal(
+    state: tetdb_schema::catalog::StoreState,
+    step: &str,
+    clock: Instant,
+) -> JournalRow {
     let (subdomain, measures) = (None, Vec::new());
     let seconds = clock.elapsed().as_secs_f64();
     JournalRow { state, subdomain, step: step.to_owned(), seconds, measures }

@@ -18,6 +18,7 @@ use tetdb_store::transfer::{Carried, TransferMethod, transfer};
 #[non_exhaustive]
 pub struct TransferredField {
     /// The field as it is now.
+    #[serde(flatten)]
     pub field: Field,
     /// How its values were evaluated.
     pub method: TransferMethod,

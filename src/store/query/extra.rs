@@ -36,7 +36,11 @@ impl ExtraRanges {
 
 impl QuerySession {
     /// The open values of a field in a sub-domain.
-    pub(crate) fn field(&mut self, field: &FieldRow, rank: u32) -> Result<&mut FieldFile, QueryError> {
+    pub(crate) fn field(
+        &mut self,
+        field: &FieldRow,
+        rank: u32,
+    ) -> Result<&mut FieldFile, QueryError> {
         let key = (field.id, rank);
         if !self.fields.contains(&key) {
             let is_full = |session: &Self| session.budget.available() < FILE_BYTES;

@@ -66,7 +66,8 @@ fn run(
 ) -> Result<Vec<Transferred>, QueryError> {
     let n_threads = parallel(rayon::current_num_threads) as u64;
     let n_sources = (memory / 2 / SOURCE_BYTES).clamp(1, n_threads);
-    let open = |_| Source::open(from, from_rows, memory / 2 / n_sources).map(Mutex::new);
+    let source_bytes = (memory / 2 / n_sources).max(SOURCE_BYTES);
+    let open = |_| Source::open(from, from_rows, source_bytes).map(Mutex::new);
     let sources = (0..n_sources).map(open).collect::<Result<Vec<_>, _>>()?;
     let n_at_once = (memory / (16 << 20)).clamp(1, 8) as usize;
     let file_bytes = (memory / 4 / n_at_once as u64).clamp(FILE_BYTES[0], FILE_BYTES[1]);
@@ -159,8 +160,7 @@ impl Run<'_> {
             for field in fields {
                 let file = FileRow { subdomain: row.rank, generation: field.serial };
                 let (path, serial) = (self.to.field_path(file), field.serial);
-                let writer =
-                    FieldWriter::create(path, &field.new, &mesh, serial, self.file_bytes)?;
+                let writer = FieldWriter::create(path, &field.new, &mesh, serial, self.file_bytes)?;
                 writers.push(writer);
             }
             let chunks: Vec<u32> = match place {
@@ -218,8 +218,7 @@ impl Run<'_> {
         };
         let found: Result<Vec<Values>, _> =
             parallel(|| targets.par_iter().with_max_len(1).map(evaluate).collect());
-        let mut chunks: Vec<Values> =
-            positions.iter().map(|_| Values::new(fields, &[])).collect();
+        let mut chunks: Vec<Values> = positions.iter().map(|_| Values::new(fields, &[])).collect();
         for ((chunk, _), values) in targets.iter().zip(found?) {
             let all = &mut chunks[*chunk];
             for (words, more) in all.words.iter_mut().zip(values.words) {

@@ -89,7 +89,8 @@ impl Source {
         let mut values = Values::new(fields, &[]);
         values.outside = places.iter().filter(|place| place.is_outside).count() as u64;
         for (field, words) in fields.iter().zip(&mut values.words) {
-            let is_linear = field.method == TransferMethod::Linear && !field.old.number.is_integer();
+            let is_linear =
+                field.method == TransferMethod::Linear && !field.old.number.is_integer();
             for place in &places {
                 let file = self.session.field(&field.old, place.rank)?;
                 // A vertex that is the point hands on each bit, also of what is not a number.

@@ -311,7 +311,8 @@ impl<'a> RemeshRun<'a> {
         }
         let regions = sum_totals(self.catalog, self.n, &totals)?.regions;
         let dropped = Previous::of(self.catalog)?;
-        let changed = |(row, _): &(SubdomainRow, _)| [row.clone(), finished[&row.rank].sealed.row.clone()];
+        let changed =
+            |(row, _): &(SubdomainRow, _)| [row.clone(), finished[&row.rank].sealed.row.clone()];
         let changed: Vec<[SubdomainRow; 2]> = self.rows.iter().map(changed).collect();
         let fields = match (self.what.drop_fields, self.what.repair) {
             (true, _) => FieldChanges::drop_all(self.catalog)?,
