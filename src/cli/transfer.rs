@@ -42,7 +42,11 @@ pub fn how(field: &TransferredField) -> String {
     if let Some([before, after]) = &field.integrals {
         for (component, (before, after)) in before.iter().zip(after).enumerate() {
             let name = &field.field.columns[component];
-            said.push(format!("integral of {name} {before:.12e} -> {after:.12e}"));
+            let change = (after - before) / before.abs().max(f64::MIN_POSITIVE);
+            let (before, after) = (short(*before), short(*after));
+            said.push(format!(
+                "integral of {name} {before} -> {after} (relative change {change:.0e})"
+            ));
         }
     }
     said.join("; ")

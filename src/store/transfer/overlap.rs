@@ -25,7 +25,7 @@ impl Cutter {
         let [a, b, c, d] = *corners;
         let (u, v, w) = (b - a, c - a, d - a);
         let det = u.dot(v.cross(w));
-        let gradients = [v.cross(w), w.cross(u), u.cross(v)].map(|normal| normal / det);
+        let gradients = [v.cross(w) / det, w.cross(u) / det, u.cross(v) / det];
         Self { bounds: Aabb::around(*corners), det, origin: a, gradients }
     }
 
@@ -35,25 +35,44 @@ impl Cutter {
     }
 
     /// Volume of what it shares with another tetrahedron.
+    #[inline]
     pub fn overlap(&self, other: &[Point; 4]) -> f64 {
-        let shares = other.map(|p| {
-            let [b, c, d] = self.gradients.map(|gradient| gradient.dot(p - self.origin));
-            [1.0 - b - c - d, b, c, d]
-        });
-        let is_beyond = |i: usize| shares.iter().all(|share| share[i] <= 0.0);
-        // Also false for what is not a number.
-        match self.det > 0.0 && !(0..4).any(is_beyond) {
-            true => within(shares, 0) * self.volume(),
-            false => 0.0,
+        let [p, q, r, s] = *other;
+        let (low, high) = (p.min(q).min(r.min(s)), p.max(q).max(r.max(s)));
+        if !self.bounds.meets(&Aabb { low, high }) {
+            return 0.0;
         }
+        let tet = [self.shares(p), self.shares(q), self.shares(r), self.shares(s)];
+        for axis in 0..4 {
+            // Also true for what is not a number.
+            if !(tet[0][axis] > 0.0
+                || tet[1][axis] > 0.0
+                || tet[2][axis] > 0.0
+                || tet[3][axis] > 0.0)
+            {
+                return 0.0;
+            }
+        }
+        let volume = (q - p).dot((r - p).cross(s - p)).abs() / 6.0;
+        if self.det > 0.0 { within(&tet, 0, volume) } else { 0.0 }
+    }
+
+    #[inline]
+    fn shares(&self, p: Point) -> Shares {
+        let [b, c, d] = &self.gradients;
+        let from = p - self.origin;
+        let (b, c, d) = (b.dot(from), c.dot(from), d.dot(from));
+        [1.0 - b - c - d, b, c, d]
     }
 }
 
-/// Volume, as a multiple of the unit tetrahedron's, of the points of `tet` whose coordinates from `axis` on are positive.
-fn within(tet: [Shares; 4], axis: usize) -> f64 {
-    if axis == 4 {
-        let [a, b, c, d] = tet.map(|[_, x, y, z]| Point::new(x, y, z));
-        return (b - a).dot((c - a).cross(d - a)).abs();
+/// Volume of the points of `tet` whose coordinates from `axis` on are positive.
+///
+/// A plane leaves a corner `a` or a prism, which is three tetrahedra. Their volumes follow from where the plane crosses the edges: no
+/// determinant is needed, and after the last plane no point either.
+fn within(tet: &[Shares; 4], axis: usize, volume: f64) -> f64 {
+    if axis == 4 || volume == 0.0 {
+        return volume;
     }
     let mut order = [0; 4];
     let (mut n_inside, mut n_outside) = (0, 0);
@@ -66,26 +85,56 @@ fn within(tet: [Shares; 4], axis: usize) -> f64 {
             order[4 - n_outside] = i;
         }
     }
-    let [a, b, c, d] = order.map(|i| tet[i]);
-    // Where the edge from a point inside to one outside crosses the plane.
-    let cut = |inside: Shares, outside: Shares| {
-        let t = inside[axis] / (inside[axis] - outside[axis]);
-        let mut at = [0, 1, 2, 3].map(|i| inside[i] + t * (outside[i] - inside[i]));
-        at[axis] = 0.0;
-        at
-    };
-    let prism = |[a, b, c]: [Shares; 3], [d, e, f]: [Shares; 3]| {
-        within([a, b, c, d], axis + 1)
-            + within([b, c, d, e], axis + 1)
-            + within([c, d, e, f], axis + 1)
-    };
+    let [a, b, c, d] = [&tet[order[0]], &tet[order[1]], &tet[order[2]], &tet[order[3]]];
+    let (is_last, next) = (axis == 3, axis + 1);
     match n_inside {
         0 => 0.0,
-        1 => within([a, cut(a, b), cut(a, c), cut(a, d)], axis + 1),
-        2 => prism([a, cut(a, c), cut(a, d)], [b, cut(b, c), cut(b, d)]),
-        3 => prism([a, b, c], [cut(a, d), cut(b, d), cut(c, d)]),
-        _ => within(tet, axis + 1),
+        1 => {
+            let [t, u, v] = [along(a, b, axis), along(a, c, axis), along(a, d, axis)];
+            let corner = [*a, at(a, b, t), at(a, c, u), at(a, d, v)];
+            within(&corner, next, volume * t * u * v)
+        }
+        2 => {
+            let [t, u] = [along(a, c, axis), along(a, d, axis)];
+            let [v, w] = [along(b, c, axis), along(b, d, axis)];
+            let volumes = [t * u, (1.0 - t) * u * v, (1.0 - u) * v * w];
+            if is_last {
+                return volume * (volumes[0] + volumes[1] + volumes[2]);
+            }
+            let (ac, ad, bc, bd) = (at(a, c, t), at(a, d, u), at(b, c, v), at(b, d, w));
+            within(&[*a, ac, ad, *b], next, volume * volumes[0])
+                + within(&[ac, ad, *b, bc], next, volume * volumes[1])
+                + within(&[ad, *b, bc, bd], next, volume * volumes[2])
+        }
+        3 => {
+            let [t, u, v] = [along(a, d, axis), along(b, d, axis), along(c, d, axis)];
+            let volumes = [t, (1.0 - t) * u, (1.0 - t) * (1.0 - u) * v];
+            if is_last {
+                return volume * (volumes[0] + volumes[1] + volumes[2]);
+            }
+            let (ad, bd, cd) = (at(a, d, t), at(b, d, u), at(c, d, v));
+            within(&[*a, *b, *c, ad], next, volume * volumes[0])
+                + within(&[*b, *c, ad, bd], next, volume * volumes[1])
+                + within(&[*c, ad, bd, cd], next, volume * volumes[2])
+        }
+        _ => within(tet, next, volume),
     }
+}
+
+/// How far along the edge from a point inside to one outside the plane crosses it.
+#[inline]
+fn along(inside: &Shares, outside: &Shares, axis: usize) -> f64 {
+    inside[axis] / (inside[axis] - outside[axis])
+}
+
+/// The point of an edge.
+#[inline]
+fn at(from: &Shares, to: &Shares, t: f64) -> Shares {
+    let mut point = *from;
+    for i in 0..4 {
+        point[i] += t * (to[i] - from[i]);
+    }
+    point
 }
 
 #[cfg(test)]

@@ -31,8 +31,8 @@ impl Source {
     /// Finds points; of several tetrahedra that hold one, the first. Shape: parallel to `points`. Errors: damage.
     pub fn places(&mut self, points: &[Point]) -> Result<Vec<Place>, QueryError> {
         let mut places = vec![None; points.len()];
-        for (rank, chunk) in self.chunks_meeting(&Aabb::around(points.iter().copied()))? {
-            let bounds = chunk_bounds(&self.session.part(rank)?.subdomain, chunk as usize);
+        let around = Aabb::around(points.iter().copied());
+        for (rank, chunk, bounds) in self.chunks_meeting(&around)? {
             let is_open = |&i: &usize| places[i].is_none() && holds(&bounds, points[i]);
             let open: Vec<usize> = (0..points.len()).filter(is_open).collect();
             if open.is_empty() {

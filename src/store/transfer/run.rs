@@ -21,7 +21,7 @@ const FILE_BYTES: [u64; 2] = [2 << 20, 16 << 20];
 /// Vertices or tetrahedra that a thread evaluates at a time: some milliseconds, in a box that meets few chunks.
 const TARGETS: usize = 256;
 /// Bytes of the targets and values of a chunk.
-const CHUNK_BYTES: u64 = 4 << 20;
+const CHUNK_BYTES: u64 = 8 << 20;
 
 /// A field on its new mesh.
 #[derive(Clone, Debug)]

@@ -48,8 +48,8 @@ impl Source {
         Ok(Self { session })
     }
 
-    /// Chunks of tetrahedra whose boxes meet another, by rank and number.
-    pub fn chunks_meeting(&mut self, bounds: &Aabb) -> Result<Vec<(u32, u32)>, QueryError> {
+    /// Chunks of tetrahedra whose boxes meet another, by rank and number, with their boxes.
+    pub fn chunks_meeting(&mut self, bounds: &Aabb) -> Result<Vec<(u32, u32, Aabb)>, QueryError> {
         let mut ranks = Vec::new();
         let rows = &self.session.rows;
         self.session.tree.visit(&|b| b.meets(bounds), &mut |i| ranks.push(rows[i].rank));
@@ -57,8 +57,9 @@ impl Source {
         for rank in ranks {
             let part = self.session.part(rank)?;
             part.tree.visit(&|b| b.meets(bounds), &mut |chunk| {
-                if chunk_bounds(&part.subdomain, chunk).meets(bounds) {
-                    chunks.push((rank, chunk as u32));
+                let around = chunk_bounds(&part.subdomain, chunk);
+                if around.meets(bounds) {
+                    chunks.push((rank, chunk as u32, around));
                 }
             });
         }
@@ -126,8 +127,7 @@ impl Source {
         let bounds = cutters.iter().fold(Aabb::EMPTY, |all, cutter| all.union(cutter.bounds));
         let mut covered = vec![0.0; tets.len()];
         let mut sums: Vec<Sums> = fields.iter().map(|field| Sums::new(field, tets.len())).collect();
-        for (rank, chunk) in self.chunks_meeting(&bounds)? {
-            let around = chunk_bounds(&self.session.part(rank)?.subdomain, chunk as usize);
+        for (rank, chunk, around) in self.chunks_meeting(&bounds)? {
             let mut near = (0..).zip(&cutters).filter(|(_, cutter)| cutter.bounds.meets(&around));
             let Some(first) = near.next() else { continue };
             let old = self.session.searched(rank, chunk)?;
