@@ -71,8 +71,12 @@ impl DecodedChunk {
         Ok(frame)
     }
 
+    #[inline]
     pub fn corners(&self, tet: &FrameTet) -> [Point; 4] {
-        tet.nodes.map(|v| self.points[v as usize])
+        // Not `map`, which stays a call: it took a sixth of the time of overlaps.
+        let [a, b, c, d] = tet.nodes;
+        let at = |v: u32| self.points[v as usize];
+        [at(a), at(b), at(c), at(d)]
     }
 
     pub fn ids(&self, tet: &FrameTet) -> [u64; 4] {

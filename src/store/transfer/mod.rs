@@ -3,12 +3,12 @@
 //! Each value depends on its place and the old mesh alone, and sums run in the order of the old mesh: the values are the same for any number
 //! of threads and any memory. Each thread has the old mesh open for itself, with the chunks that it decoded last.
 //!
-//! Reading order: `overlap` (the volume that two tetrahedra share), `source` (the old mesh), `place` (points in it), `run` (the new files).
+//! Reading order: `overlap` (the volume that two tetrahedra share), `old_mesh`, `place` (points in it), `run` (the new files).
 
+mod old_mesh;
 mod overlap;
 mod place;
 mod run;
-mod source;
 
 pub use run::{Transferred, transfer};
 

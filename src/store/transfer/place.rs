@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use super::source::Source;
+use super::old_mesh::OldMesh;
 use crate::query::{QueryError, Vector, bounds_of, chunk_bounds, holds, shares};
 use tetdb_base::geom::{Aabb, Dyadic, Point};
 
@@ -27,7 +27,7 @@ pub struct Place {
     pub is_outside: bool,
 }
 
-impl Source {
+impl OldMesh {
     /// Finds points; of several tetrahedra that hold one, the first. Shape: parallel to `points`. Errors: damage.
     pub fn places(&mut self, points: &[Point]) -> Result<Vec<Place>, QueryError> {
         let mut places = vec![None; points.len()];

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::Carried;
-use super::source::{Source, Targets, Values, add};
+use super::old_mesh::{OldMesh, TargetSlice, TargetValues, add};
 use crate::query::QueryError;
 use crate::sealed::{FieldWriter, Subdomain};
 use crate::store::Catalog;
@@ -67,11 +67,11 @@ fn run(
     let n_threads = parallel(rayon::current_num_threads) as u64;
     let n_sources = (memory / 2 / SOURCE_BYTES).clamp(1, n_threads);
     let source_bytes = (memory / 2 / n_sources).max(SOURCE_BYTES);
-    let open = |_| Source::open(from, from_rows, source_bytes).map(Mutex::new);
+    let open = |_| OldMesh::open(from, from_rows, source_bytes).map(Mutex::new);
     let sources = (0..n_sources).map(open).collect::<Result<Vec<_>, _>>()?;
     let n_at_once = (memory / (16 << 20)).clamp(1, 8) as usize;
     let file_bytes = (memory / 4 / n_at_once as u64).clamp(FILE_BYTES[0], FILE_BYTES[1]);
-    let run = Run {
+    let run = TransferRun {
         sources,
         to,
         to_rows,
@@ -105,12 +105,12 @@ fn n_values(row: &SubdomainRow, place: FieldPlace) -> u64 {
 }
 
 /// The positions of a chunk of the new mesh.
-enum Positions {
+enum ChunkPositions {
     Points(Vec<Point>),
     Tets(Vec<[Point; 4]>),
 }
 
-impl Positions {
+impl ChunkPositions {
     fn read(place: FieldPlace, mesh: &mut Subdomain, chunk: u32) -> Result<Self, QueryError> {
         Ok(match place {
             FieldPlace::Vertices => {
@@ -126,17 +126,17 @@ impl Positions {
         })
     }
 
-    fn targets(&self) -> Vec<Targets<'_>> {
+    fn targets(&self) -> Vec<TargetSlice<'_>> {
         match self {
-            Self::Points(points) => points.chunks(TARGETS).map(Targets::Points).collect(),
-            Self::Tets(tets) => tets.chunks(TARGETS).map(Targets::Tets).collect(),
+            Self::Points(points) => points.chunks(TARGETS).map(TargetSlice::Points).collect(),
+            Self::Tets(tets) => tets.chunks(TARGETS).map(TargetSlice::Tets).collect(),
         }
     }
 }
 
-struct Run<'a> {
+struct TransferRun<'a> {
     /// The old mesh, for each thread.
-    sources: Vec<Mutex<Source>>,
+    sources: Vec<Mutex<OldMesh>>,
     to: &'a Catalog,
     to_rows: &'a [SubdomainRow],
     file_bytes: usize,
@@ -144,7 +144,7 @@ struct Run<'a> {
     n_chunks: usize,
 }
 
-impl Run<'_> {
+impl TransferRun<'_> {
     /// Evaluates and writes fields at one place.
     fn group(
         &self,
@@ -152,7 +152,7 @@ impl Run<'_> {
         fields: &[Carried],
         progress: &mut dyn FnMut(u64),
     ) -> Result<Vec<Transferred>, QueryError> {
-        let mut sums = Values::new(fields, &[]);
+        let mut sums = TargetValues::new(fields, &[]);
         let mut parts = vec![Vec::new(); fields.len()];
         for row in self.to_rows {
             let mut mesh = self.to.open_row(row.clone(), self.file_bytes)?;
@@ -168,7 +168,7 @@ impl Run<'_> {
                 FieldPlace::Tets => (0..mesh.tet_summaries().len() as u32).collect(),
             };
             for batch in chunks.chunks(self.n_chunks) {
-                let read = |&chunk| Positions::read(place, &mut mesh, chunk);
+                let read = |&chunk| ChunkPositions::read(place, &mut mesh, chunk);
                 let positions = batch.iter().map(read).collect::<Result<Vec<_>, _>>()?;
                 for values in self.evaluate(&positions, fields)? {
                     for (writer, words) in writers.iter_mut().zip(&values.words) {
@@ -204,21 +204,22 @@ impl Run<'_> {
     /// The values of chunks on all threads, in order.
     fn evaluate(
         &self,
-        positions: &[Positions],
+        positions: &[ChunkPositions],
         fields: &[Carried],
-    ) -> Result<Vec<Values>, QueryError> {
-        let targets: Vec<(usize, Targets)> = (0..)
+    ) -> Result<Vec<TargetValues>, QueryError> {
+        let targets: Vec<(usize, TargetSlice)> = (0..)
             .zip(positions)
             .flat_map(|(chunk, of)| of.targets().into_iter().map(move |targets| (chunk, targets)))
             .collect();
-        let evaluate = |(_, targets): &(usize, Targets)| {
+        let evaluate = |(_, targets): &(usize, TargetSlice)| {
             check_cancelled();
             let thread = rayon::current_thread_index().unwrap_or(0);
             self.source(thread).values(targets, fields)
         };
-        let found: Result<Vec<Values>, _> =
+        let found: Result<Vec<TargetValues>, _> =
             parallel(|| targets.par_iter().with_max_len(1).map(evaluate).collect());
-        let mut chunks: Vec<Values> = positions.iter().map(|_| Values::new(fields, &[])).collect();
+        let mut chunks: Vec<TargetValues> =
+            positions.iter().map(|_| TargetValues::new(fields, &[])).collect();
         for ((chunk, _), values) in targets.iter().zip(found?) {
             let all = &mut chunks[*chunk];
             for (words, more) in all.words.iter_mut().zip(values.words) {
@@ -231,7 +232,7 @@ impl Run<'_> {
         Ok(chunks)
     }
 
-    fn source(&self, thread: usize) -> std::sync::MutexGuard<'_, Source> {
+    fn source(&self, thread: usize) -> std::sync::MutexGuard<'_, OldMesh> {
         let source = &self.sources[thread % self.sources.len()];
         source.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -11,21 +11,21 @@ use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::field::Scalar;
 
 /// The old mesh, open for one thread.
-pub struct Source {
+pub struct OldMesh {
     pub session: QuerySession,
 }
 
 /// Vertices or tetrahedra of the new mesh that follow one another.
-pub enum Targets<'a> {
+pub enum TargetSlice<'a> {
     Points(&'a [Point]),
     Tets(&'a [[Point; 4]]),
 }
 
 /// Values at some targets.
-pub struct Values {
+pub struct TargetValues {
     /// Of each field, value by value.
     pub words: Vec<Vec<u64>>,
-    /// Targets outside of the old mesh.
+    /// TargetSlice outside of the old mesh.
     pub outside: u64,
     /// Volume of the tetrahedra, and what of it the old mesh covers, where that was computed.
     pub volumes: [f64; 2],
@@ -34,14 +34,14 @@ pub struct Values {
 }
 
 /// Sums over what tetrahedra of the new mesh share with those of the old.
-enum Sums {
+enum OverlapSums {
     /// Value times volume, by tetrahedron and component.
     Means(Vec<f64>),
     /// The values met by each tetrahedron, with their volume.
     Shares(Vec<Vec<(Vec<u64>, f64)>>),
 }
 
-impl Source {
+impl OldMesh {
     /// Opens these sub-domains with `bytes` of memory. Errors: damage; too little memory.
     pub fn open(from: &Catalog, rows: &[SubdomainRow], bytes: u64) -> Result<Self, QueryError> {
         let session = QuerySession::open_rows(from.share(), rows.to_vec(), &Budget::new(bytes))?;
@@ -67,17 +67,21 @@ impl Source {
     }
 
     /// The values of fields, all with one method. Errors: damage.
-    pub fn values(&mut self, at: &Targets, fields: &[Carried]) -> Result<Values, QueryError> {
+    pub fn values(
+        &mut self,
+        at: &TargetSlice,
+        fields: &[Carried],
+    ) -> Result<TargetValues, QueryError> {
         let method = fields.first().map(|field| field.method);
         match at {
-            Targets::Points(points) => self.at_points(points, fields),
-            Targets::Tets(tets) if method == Some(TransferMethod::Overlap) => {
+            TargetSlice::Points(points) => self.at_points(points, fields),
+            TargetSlice::Tets(tets) if method == Some(TransferMethod::Overlap) => {
                 self.by_overlap(tets, fields)
             }
-            Targets::Tets(tets) => {
+            TargetSlice::Tets(tets) => {
                 let cutters: Vec<Cutter> = tets.iter().map(Cutter::new).collect();
                 let all: Vec<usize> = (0..tets.len()).collect();
-                let mut values = Values::new(fields, &cutters);
+                let mut values = TargetValues::new(fields, &cutters);
                 self.at_centroids(tets, &all, fields, &mut values)?;
                 values.integrate(fields, &cutters);
                 Ok(values)
@@ -85,9 +89,13 @@ impl Source {
         }
     }
 
-    fn at_points(&mut self, points: &[Point], fields: &[Carried]) -> Result<Values, QueryError> {
+    fn at_points(
+        &mut self,
+        points: &[Point],
+        fields: &[Carried],
+    ) -> Result<TargetValues, QueryError> {
         let places = self.places(points)?;
-        let mut values = Values::new(fields, &[]);
+        let mut values = TargetValues::new(fields, &[]);
         values.outside = places.iter().filter(|place| place.is_outside).count() as u64;
         for (field, words) in fields.iter().zip(&mut values.words) {
             let is_linear =
@@ -122,11 +130,12 @@ impl Source {
         &mut self,
         tets: &[[Point; 4]],
         fields: &[Carried],
-    ) -> Result<Values, QueryError> {
+    ) -> Result<TargetValues, QueryError> {
         let cutters: Vec<Cutter> = tets.iter().map(Cutter::new).collect();
         let bounds = cutters.iter().fold(Aabb::EMPTY, |all, cutter| all.union(cutter.bounds));
         let mut covered = vec![0.0; tets.len()];
-        let mut sums: Vec<Sums> = fields.iter().map(|field| Sums::new(field, tets.len())).collect();
+        let mut sums: Vec<OverlapSums> =
+            fields.iter().map(|field| OverlapSums::new(field, tets.len())).collect();
         for (rank, chunk, around) in self.chunks_meeting(&bounds)? {
             let mut near = (0..).zip(&cutters).filter(|(_, cutter)| cutter.bounds.meets(&around));
             let Some(first) = near.next() else { continue };
@@ -144,7 +153,7 @@ impl Source {
                 });
             }
         }
-        let mut values = Values::new(fields, &cutters);
+        let mut values = TargetValues::new(fields, &cutters);
         values.volumes[1] = covered.iter().sum();
         for ((field, words), sum) in fields.iter().zip(&mut values.words).zip(sums) {
             sum.words(field, &covered, words);
@@ -161,7 +170,7 @@ impl Source {
         tets: &[[Point; 4]],
         which: &[usize],
         fields: &[Carried],
-        values: &mut Values,
+        values: &mut TargetValues,
     ) -> Result<(), QueryError> {
         let centroid = |&i: &usize| tets[i].iter().sum::<Point>() * 0.25;
         let places = self.places(&which.iter().map(centroid).collect::<Vec<_>>())?;
@@ -198,13 +207,13 @@ impl Source {
 
     /// Sums of value times volume over the old mesh: of each field, for each component. Errors: damage.
     pub fn integrals(&mut self, fields: &[Carried]) -> Result<Vec<Vec<f64>>, QueryError> {
-        let mut all = Values::new(fields, &[]).integrals;
+        let mut all = TargetValues::new(fields, &[]).integrals;
         for row in self.session.rows.clone() {
             for chunk in 0..row.chunks[0] {
                 let old = self.session.searched(row.rank, chunk)?;
                 let corners = |tet| Cutter::new(&old.frame.corners(tet));
                 let cutters: Vec<Cutter> = old.frame.tets.iter().map(corners).collect();
-                let mut values = Values::new(fields, &cutters);
+                let mut values = TargetValues::new(fields, &cutters);
                 for (words, columns) in
                     values.words.iter_mut().zip(self.columns(fields, row.rank, chunk)?)
                 {
@@ -225,7 +234,7 @@ pub fn add(all: &mut [Vec<f64>], more: &[Vec<f64>]) {
     pairs.for_each(|(sum, x)| *sum += x);
 }
 
-impl Values {
+impl TargetValues {
     pub fn new(fields: &[Carried], cutters: &[Cutter]) -> Self {
         let zeros = |field: &Carried| vec![0.0; field.old.components as usize];
         Self {
@@ -247,7 +256,7 @@ impl Values {
     }
 }
 
-impl Sums {
+impl OverlapSums {
     fn new(field: &Carried, n_tets: usize) -> Self {
         match field.old.number.is_integer() {
             true => Self::Shares(vec![Vec::new(); n_tets]),
