@@ -86,7 +86,8 @@ impl Store {
         Remesh::new(path, settings)
     }
 
-    /// Restores the sub-domains that the last [`Store::remesh`] replaced. Errors: `nothing-to-undo`.
+    /// Restores the sub-domains that the last [`Store::remesh`] replaced, with the values of their fields. Errors: `nothing-to-undo`;
+    /// `bad-field` for a field that was added since.
     pub fn undo(self) -> Result<Self, Error> {
         Ok(self.undo_reported(false)?.store)
     }

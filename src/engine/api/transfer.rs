@@ -7,11 +7,11 @@ use serde::Serialize;
 use super::field_spec::bad;
 use super::fields::{field_called, fields_of, journal};
 use super::{Error, Field, Store};
-use crate::pipeline::CarriedField;
+use crate::pipeline::FieldChange;
 use tetdb_schema::field::FieldRow;
 use tetdb_schema::word::Word;
 use tetdb_store::store::Catalog;
-use tetdb_store::transfer::{Carried, TransferMethod, transfer};
+use tetdb_store::transfer::{FieldTransfer, TransferMethod, transfer};
 
 /// A field that was evaluated on another mesh.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -63,7 +63,7 @@ impl Store {
         method: Option<TransferMethod>,
     ) -> Result<Vec<TransferredField>, Error> {
         let clock = Instant::now();
-        let carried = self.change_fields(|catalog, settings| {
+        let evaluated = self.change_fields(|catalog, settings| {
             let mut old = from.catalog_shared();
             let fields = chosen(&mut old, names, method, catalog)?;
             let (old_rows, rows) = (old.subdomains()?, catalog.subdomains()?);
@@ -79,22 +79,22 @@ impl Store {
                 }
                 Ok(())
             })?;
-            let carried = fields.into_iter().zip(done).map(|(field, values)| {
-                let Carried { new: field, method, .. } = field;
-                CarriedField { field, method, values }
+            let evaluated = fields.into_iter().zip(done).map(|(field, values)| {
+                let FieldTransfer { new: field, method, .. } = field;
+                FieldChange { field, method, values }
             });
-            Ok(carried.collect())
+            Ok(evaluated.collect())
         })?;
-        self.transferred(carried)
+        self.transferred(evaluated)
     }
 
     /// The reports of fields that were evaluated on the mesh of this store.
     pub(super) fn transferred(
         &self,
-        carried: Vec<CarriedField>,
+        evaluated: Vec<FieldChange>,
     ) -> Result<Vec<TransferredField>, Error> {
         let fields = self.fields()?;
-        let found = carried.into_iter().filter_map(|CarriedField { field, method, values }| {
+        let found = evaluated.into_iter().filter_map(|FieldChange { field, method, values }| {
             Some(TransferredField {
                 field: fields.iter().find(|known| known.name == field.name)?.clone(),
                 method,
@@ -113,7 +113,7 @@ fn chosen(
     names: &[&str],
     method: Option<TransferMethod>,
     new: &mut Catalog,
-) -> Result<Vec<Carried>, Error> {
+) -> Result<Vec<FieldTransfer>, Error> {
     let mut fields: Vec<FieldRow> = Vec::new();
     for name in names {
         if !fields.iter().any(|field| field.name == *name) {
@@ -129,7 +129,7 @@ fn chosen(
     }
     let known = fields_of(new)?;
     let (id, serial) = new.next_field()?;
-    let mut carried = Vec::new();
+    let mut evaluated = Vec::new();
     for (i, old) in (0..).zip(fields) {
         if known.iter().any(|field| field.name == old.name) {
             let message = format!("there is a field {} already", old.name);
@@ -143,7 +143,7 @@ fn chosen(
                 .with_help("linear is for fields at vertices, overlap for fields at tetrahedra"));
         }
         let row = FieldRow { id: id + i, ..old.clone() };
-        carried.push(Carried { old, new: row, method, serial: serial + i });
+        evaluated.push(FieldTransfer { old, new: row, method, serial: serial + i });
     }
-    Ok(carried)
+    Ok(evaluated)
 }

@@ -49,7 +49,7 @@ impl TransferMethod {
 
 /// A field that is evaluated on another mesh.
 #[derive(Clone, Debug)]
-pub struct Carried {
+pub struct FieldTransfer {
     /// Its row in the old mesh's store.
     pub old: FieldRow,
     /// Its row in the new mesh's store; place, type and components are the same.

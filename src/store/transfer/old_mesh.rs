@@ -1,7 +1,7 @@
 //! The old mesh with its fields: chunks decoded last within a share of the memory.
 
 use super::overlap::Cutter;
-use super::{Carried, TransferMethod};
+use super::{FieldTransfer, TransferMethod};
 use crate::query::{QueryError, QuerySession, chunk_bounds};
 use crate::sealed::FieldColumn;
 use crate::store::Catalog;
@@ -70,7 +70,7 @@ impl OldMesh {
     pub fn values(
         &mut self,
         at: &TargetSlice,
-        fields: &[Carried],
+        fields: &[FieldTransfer],
     ) -> Result<TargetValues, QueryError> {
         let method = fields.first().map(|field| field.method);
         match at {
@@ -92,7 +92,7 @@ impl OldMesh {
     fn at_points(
         &mut self,
         points: &[Point],
-        fields: &[Carried],
+        fields: &[FieldTransfer],
     ) -> Result<TargetValues, QueryError> {
         let places = self.places(points)?;
         let mut values = TargetValues::new(fields, &[]);
@@ -129,7 +129,7 @@ impl OldMesh {
     fn by_overlap(
         &mut self,
         tets: &[[Point; 4]],
-        fields: &[Carried],
+        fields: &[FieldTransfer],
     ) -> Result<TargetValues, QueryError> {
         let cutters: Vec<Cutter> = tets.iter().map(Cutter::new).collect();
         let bounds = cutters.iter().fold(Aabb::EMPTY, |all, cutter| all.union(cutter.bounds));
@@ -169,7 +169,7 @@ impl OldMesh {
         &mut self,
         tets: &[[Point; 4]],
         which: &[usize],
-        fields: &[Carried],
+        fields: &[FieldTransfer],
         values: &mut TargetValues,
     ) -> Result<(), QueryError> {
         let centroid = |&i: &usize| tets[i].iter().sum::<Point>() * 0.25;
@@ -192,7 +192,7 @@ impl OldMesh {
     /// The values of a chunk of tetrahedra: of each field, for each component.
     fn columns(
         &mut self,
-        fields: &[Carried],
+        fields: &[FieldTransfer],
         rank: u32,
         chunk: u32,
     ) -> Result<Vec<Vec<FieldColumn>>, QueryError> {
@@ -206,7 +206,7 @@ impl OldMesh {
     }
 
     /// Sums of value times volume over the old mesh: of each field, for each component. Errors: damage.
-    pub fn integrals(&mut self, fields: &[Carried]) -> Result<Vec<Vec<f64>>, QueryError> {
+    pub fn integrals(&mut self, fields: &[FieldTransfer]) -> Result<Vec<Vec<f64>>, QueryError> {
         let mut all = TargetValues::new(fields, &[]).integrals;
         for row in self.session.rows.clone() {
             for chunk in 0..row.chunks[0] {
@@ -235,8 +235,8 @@ pub fn add(all: &mut [Vec<f64>], more: &[Vec<f64>]) {
 }
 
 impl TargetValues {
-    pub fn new(fields: &[Carried], cutters: &[Cutter]) -> Self {
-        let zeros = |field: &Carried| vec![0.0; field.old.components as usize];
+    pub fn new(fields: &[FieldTransfer], cutters: &[Cutter]) -> Self {
+        let zeros = |field: &FieldTransfer| vec![0.0; field.old.components as usize];
         Self {
             words: vec![Vec::new(); fields.len()],
             outside: 0,
@@ -245,7 +245,7 @@ impl TargetValues {
         }
     }
 
-    fn integrate(&mut self, fields: &[Carried], cutters: &[Cutter]) {
+    fn integrate(&mut self, fields: &[FieldTransfer], cutters: &[Cutter]) {
         for ((field, words), sums) in fields.iter().zip(&self.words).zip(&mut self.integrals) {
             for (value, cutter) in words.chunks(sums.len()).zip(cutters) {
                 for (sum, &word) in sums.iter_mut().zip(value) {
@@ -257,7 +257,7 @@ impl TargetValues {
 }
 
 impl OverlapSums {
-    fn new(field: &Carried, n_tets: usize) -> Self {
+    fn new(field: &FieldTransfer, n_tets: usize) -> Self {
         match field.old.number.is_integer() {
             true => Self::Shares(vec![Vec::new(); n_tets]),
             false => Self::Means(vec![0.0; n_tets * field.old.components as usize]),
@@ -267,7 +267,7 @@ impl OverlapSums {
     /// Adds the value of row `i` of the columns with a volume.
     fn add(
         &mut self,
-        field: &Carried,
+        field: &FieldTransfer,
         new: usize,
         (columns, i): (&[FieldColumn], usize),
         volume: f64,
@@ -290,7 +290,7 @@ impl OverlapSums {
     }
 
     /// The words of all tetrahedra; any where nothing is covered.
-    fn words(self, field: &Carried, covered: &[f64], words: &mut Vec<u64>) {
+    fn words(self, field: &FieldTransfer, covered: &[f64], words: &mut Vec<u64>) {
         let n = field.old.components as usize;
         match self {
             Self::Means(sums) => {
@@ -309,7 +309,7 @@ impl OverlapSums {
     }
 }
 
-impl Carried {
+impl FieldTransfer {
     /// The word of a mean of values.
     fn word(&self, mean: f64) -> u64 {
         self.old.number.pack(Scalar::Float(mean)).expect("a mean of numbers of the type fits it")

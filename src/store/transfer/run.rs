@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::Carried;
+use super::FieldTransfer;
 use super::old_mesh::{OldMesh, TargetSlice, TargetValues, add};
 use crate::query::QueryError;
 use crate::sealed::{FieldWriter, Subdomain};
@@ -42,7 +42,7 @@ pub struct Transferred {
 pub fn transfer(
     (from, from_rows): (&Catalog, &[SubdomainRow]),
     (to, to_rows): (&Catalog, &[SubdomainRow]),
-    fields: &[Carried],
+    fields: &[FieldTransfer],
     memory: u64,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Vec<Transferred>, QueryError> {
@@ -60,7 +60,7 @@ pub fn transfer(
 fn run(
     (from, from_rows): (&Catalog, &[SubdomainRow]),
     (to, to_rows): (&Catalog, &[SubdomainRow]),
-    fields: &[Carried],
+    fields: &[FieldTransfer],
     memory: u64,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Vec<Transferred>, QueryError> {
@@ -78,7 +78,8 @@ fn run(
         file_bytes: file_bytes as usize,
         n_chunks: (memory / 8 / CHUNK_BYTES).clamp(1, n_sources) as usize,
     };
-    let count = |field: &Carried| to_rows.iter().map(|row| n_values(row, field.old.place)).sum();
+    let count =
+        |field: &FieldTransfer| to_rows.iter().map(|row| n_values(row, field.old.place)).sum();
     let total: u64 = fields.iter().map(count).map(|n: u64| n).sum();
     let mut done = 0;
     let mut found = vec![None; fields.len()];
@@ -86,7 +87,7 @@ fn run(
         let at_place: Vec<usize> =
             (0..fields.len()).filter(|&i| fields[i].old.place == place).collect();
         for group in at_place.chunks(n_at_once) {
-            let own: Vec<Carried> = group.iter().map(|&i| fields[i].clone()).collect();
+            let own: Vec<FieldTransfer> = group.iter().map(|&i| fields[i].clone()).collect();
             let transferred = run.group(place, &own, &mut |n| {
                 done += n * own.len() as u64;
                 progress(done, total);
@@ -111,19 +112,33 @@ enum ChunkPositions {
 }
 
 impl ChunkPositions {
+    /// Errors: damage.
     fn read(place: FieldPlace, mesh: &mut Subdomain, chunk: u32) -> Result<Self, QueryError> {
-        Ok(match place {
+        let (read, expected) = match place {
             FieldPlace::Vertices => {
                 let vertices = mesh.vertex_chunk(chunk)?.records;
-                Self::Points(vertices.iter().map(|v| Point::from_array(v.point)).collect())
+                let points = vertices.iter().map(|v| Point::from_array(v.point)).collect();
+                (Self::Points(points), mesh.vertex_summaries()[chunk as usize].count)
             }
             FieldPlace::Tets => {
                 let tets = mesh.tet_chunk(chunk)?.records;
                 let mut corners =
                     |nodes| Ok::<_, QueryError>(mesh.corners::<4>(nodes)?.map(|c| c.point));
-                Self::Tets(tets.iter().map(|tet| corners(tet.nodes)).collect::<Result<_, _>>()?)
+                let tets: Result<_, _> = tets.iter().map(|tet| corners(tet.nodes)).collect();
+                (Self::Tets(tets?), mesh.tet_summaries()[chunk as usize].count)
             }
-        })
+        };
+        match read.len() == expected as usize {
+            true => Ok(read),
+            false => Err(mesh.damaged(format!("chunk {chunk} is not as its summary says")).into()),
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Points(points) => points.len(),
+            Self::Tets(tets) => tets.len(),
+        }
     }
 
     fn targets(&self) -> Vec<TargetSlice<'_>> {
@@ -149,7 +164,7 @@ impl TransferRun<'_> {
     fn group(
         &self,
         place: FieldPlace,
-        fields: &[Carried],
+        fields: &[FieldTransfer],
         progress: &mut dyn FnMut(u64),
     ) -> Result<Vec<Transferred>, QueryError> {
         let mut sums = TargetValues::new(fields, &[]);
@@ -205,7 +220,7 @@ impl TransferRun<'_> {
     fn evaluate(
         &self,
         positions: &[ChunkPositions],
-        fields: &[Carried],
+        fields: &[FieldTransfer],
     ) -> Result<Vec<TargetValues>, QueryError> {
         let targets: Vec<(usize, TargetSlice)> = (0..)
             .zip(positions)

@@ -1,12 +1,12 @@
 //! Fields of a store whose sub-domains are meshed again.
 
-use super::summary::CarriedField;
+use super::summary::FieldChange;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::field::{FieldPart, FieldRow};
 use tetdb_store::store::{Catalog, Step, StoreError};
-use tetdb_store::transfer::{Carried, TransferMethod, transfer};
+use tetdb_store::transfer::{FieldTransfer, TransferMethod, transfer};
 
 /// What a change of sub-domains does with the fields of the store.
 #[derive(Default)]
@@ -18,7 +18,7 @@ pub struct FieldChanges {
     parts: Vec<FieldPart>,
     previous: Vec<FieldPart>,
     /// How values were evaluated on the new mesh.
-    pub carried: Vec<CarriedField>,
+    pub evaluated: Vec<FieldChange>,
 }
 
 impl FieldChanges {
@@ -51,11 +51,11 @@ impl FieldChanges {
         watch: &Watcher,
     ) -> Result<Self, PipelineError> {
         let (_, serial) = catalog.next_field()?;
-        let fields: Vec<Carried> = (serial..)
+        let fields: Vec<FieldTransfer> = (serial..)
             .zip(catalog.fields()?)
             .map(|(serial, old)| {
                 let method = TransferMethod::default_at(old.place);
-                Carried { new: old.clone(), old, method, serial }
+                FieldTransfer { new: old.clone(), old, method, serial }
             })
             .collect();
         if fields.is_empty() {
@@ -75,7 +75,7 @@ impl FieldChanges {
                 let old = parts.iter().find(is_old);
                 changes.changed.extend(old.map(|old| [old.clone(), part.clone()]));
             }
-            changes.carried.push(CarriedField { field: field.new, method: field.method, values });
+            changes.evaluated.push(FieldChange { field: field.new, method: field.method, values });
         }
         Ok(changes)
     }

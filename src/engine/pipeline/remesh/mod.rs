@@ -12,4 +12,4 @@ pub use previous::{forget, undo};
 pub use request::Resaturation;
 pub use resaturate::{Forecast, changed, forecast, recorded_request, resaturate};
 pub use sizes::{NewSizes, Values};
-pub use summary::{CarriedField, ResaturateSummary, Resaturated};
+pub use summary::{FieldChange, ResaturateSummary, Resaturated};

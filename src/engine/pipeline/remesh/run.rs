@@ -366,7 +366,7 @@ impl<'a> RemeshRun<'a> {
             step.set_state(StoreState::Sealed);
             Ok(())
         })?;
-        Ok(ResaturateSummary { fields: fields.carried, ..self.summary(finished) })
+        Ok(ResaturateSummary { fields: fields.evaluated, ..self.summary(finished) })
     }
 
     /// Handles an unchanged result: drops the new files. The version before the last change can still be restored.

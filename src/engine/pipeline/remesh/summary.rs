@@ -19,7 +19,7 @@ pub struct Resaturated {
 
 /// A field that was evaluated on the new mesh.
 #[derive(Clone, Debug)]
-pub struct CarriedField {
+pub struct FieldChange {
     /// The field.
     pub field: FieldRow,
     /// How its values were evaluated.
@@ -34,7 +34,7 @@ pub struct ResaturateSummary {
     /// The changed sub-domains, by rank.
     pub parts: Vec<Resaturated>,
     /// Fields of the store, evaluated on the changed sub-domains.
-    pub fields: Vec<CarriedField>,
+    pub fields: Vec<FieldChange>,
     /// Pages read and written.
     pub pages: PagerStats,
     /// Largest number of pages held in memory at once.
