@@ -43,15 +43,9 @@ impl Cutter {
             return 0.0;
         }
         let tet = [self.shares(p), self.shares(q), self.shares(r), self.shares(s)];
-        for axis in 0..4 {
-            // Also true for what is not a number.
-            if !(tet[0][axis] > 0.0
-                || tet[1][axis] > 0.0
-                || tet[2][axis] > 0.0
-                || tet[3][axis] > 0.0)
-            {
-                return 0.0;
-            }
+        // Also true for what is not a number.
+        if (0..4).any(|axis| !tet.iter().any(|share| share[axis] > 0.0)) {
+            return 0.0;
         }
         let volume = (q - p).dot((r - p).cross(s - p)).abs() / 6.0;
         if self.det > 0.0 { within(&tet, 0, volume) } else { 0.0 }
@@ -76,8 +70,8 @@ fn within(tet: &[Shares; 4], axis: usize, volume: f64) -> f64 {
     }
     let mut order = [0; 4];
     let (mut n_inside, mut n_outside) = (0, 0);
-    for i in 0..4 {
-        if tet[i][axis] > 0.0 {
+    for (i, share) in tet.iter().enumerate() {
+        if share[axis] > 0.0 {
             order[n_inside] = i;
             n_inside += 1;
         } else {
