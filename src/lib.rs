@@ -15,9 +15,10 @@ pub use tetdb_engine::api::{
     SAMPLE_PREFIX, Scalar, Seal, Seed, SeedKind, Settings, Share, ShownTriangles, SizeWarning,
     Sizes, Snapped, Snapshot, SplitReport, StageInfo, Store, StoreInfo, SubdomainInfo, Subdomains,
     Suggestion, Summary, Surface, SurfaceRemesh, SurfaceRemeshReport, SurfaceReport, SurfaceWrap,
-    SurfaceWritten, TaskReport, TaskStage, TaskStatus, Tasks, TetId, VARIABLES, Verification,
-    VerifyLevel, VertexId, WELD_SHARE_MAX, Word, WorkersPrediction, WrapReport, Writers,
-    check_target, csv_head, inputs_of, peak_bytes, short, task_ranges, typed,
+    SurfaceWritten, TaskReport, TaskStage, TaskStatus, Tasks, TetId, TransferMethod,
+    TransferredField, VARIABLES, Verification, VerifyLevel, VertexId, WELD_SHARE_MAX, Word,
+    WorkersPrediction, WrapReport, Writers, check_target, csv_head, inputs_of, peak_bytes, short,
+    task_ranges, typed,
 };
 
 #[cfg(feature = "mpi")]

@@ -28,7 +28,7 @@ const HOUSE: &[(&str, &[&[&str]])] = &[
         ],
     ),
     ("repair", &[&["resolve", "remesh", "wrap"], &["close"]]),
-    ("store", &[&["sealed"], &["store"], &["query", "audit"]]),
+    ("store", &[&["sealed"], &["store"], &["query", "audit"], &["transfer"]]),
     ("io", &[&["read", "write"]]),
     ("engine", &[&["pipeline"], &["view"], &["api"]]),
     ("cli", &[]),

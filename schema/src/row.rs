@@ -56,11 +56,13 @@ pub enum RowKind {
     Field = 81,
     /// [`FieldPart`](crate::field::FieldPart) (number of the field, rank).
     FieldPart = 82,
+    /// [`FieldPart`](crate::field::FieldPart) of a sub-domain before its last change (number of the field, rank).
+    PreviousFieldPart = 83,
 }
 
 impl RowKind {
     /// All kinds, by number.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Format,
         Self::State,
         Self::Job,
@@ -80,6 +82,7 @@ impl RowKind {
         Self::LabelSets,
         Self::Field,
         Self::FieldPart,
+        Self::PreviousFieldPart,
     ];
 
     /// The kind of a key; `None` for a key of no row.

@@ -37,6 +37,7 @@ mod snapshot;
 mod task_scripts;
 mod tasks;
 mod threads;
+mod transfer;
 mod verify;
 mod words;
 mod wrap;
@@ -203,6 +204,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Info(args) => info::run(args, console),
         Command::Query(args) => query::run(args, console),
         Command::Field(args) => field::run(args, console),
+        Command::Transfer(args) => transfer::run(args, console),
         Command::Verify(args) => verify::run(args, console),
         Command::Compare(args) => compare::run(args, console),
         Command::Digest(args) => digest::run(args, console),
@@ -228,5 +230,6 @@ fn writes_files(command: &Command) -> bool {
             | Command::Report(_)
             | Command::Query(_)
             | Command::Field(_)
+            | Command::Transfer(_)
     )
 }

@@ -9,6 +9,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::info::{hex, share_below_two};
 use super::resaturate_sizes::{self, with_sizes};
+use super::transfer::how;
 use super::words::count;
 use super::{memory, mesh};
 use tetdb_engine::api::{
@@ -44,11 +45,7 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
         }
         return Ok(0);
     }
-    let remeshed = remesh.run().map_err(|e| match e.code() {
-        Code::BadField => Failure::from(e)
-            .help("--drop-fields drops them with the old mesh; add them again afterwards"),
-        _ => e.into(),
-    })?;
+    let remeshed = remesh.run()?;
     if remeshed.subdomains.is_empty() {
         print_nothing(args, console);
         return Ok(0);
@@ -132,7 +129,7 @@ fn finish(
         console.answer(&json!({
             "schema": 1, "store": args.store.display().to_string(), "digest": digest,
             "subdomains": objects(remeshed),
-            "unchanged": unchanged,
+            "unchanged": unchanged, "fields": remeshed.fields,
             "memory_cap_bytes": cap, "peak_bytes": memory::peak(),
             "pages_read": remeshed.pages_read, "pages_written": remeshed.pages_written,
             "frames_used": remeshed.frames_used,
@@ -164,6 +161,9 @@ fn finish(
                 hex(new.interface_digest)
             ));
         }
+    }
+    for field in &remeshed.fields {
+        console.line(&format!("field {}: {}", field.field.name, how(field)));
     }
     console.line(&format!(
         "{} as before; digest of all {digest}",

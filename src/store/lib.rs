@@ -5,6 +5,7 @@
 //! | [`sealed`] | compressed sub-domains, read chunk by chunk |
 //! | [`store`] | the catalog of job, steps and sub-domains; one commit a step |
 //! | [`query`] | locate, select, order |
+//! | [`transfer`] | fields of one mesh evaluated on another |
 //! | [`audit`] | verification, digest, comparison |
 //!
 //! This crate does no meshing. Programs use the crate `tetdb`; the items that are public here may change at any time.
@@ -15,3 +16,4 @@ pub mod audit;
 pub mod query;
 pub mod sealed;
 pub mod store;
+pub mod transfer;

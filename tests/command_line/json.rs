@@ -14,7 +14,7 @@ const PAGE: &str = include_str!("../../src/guide/scripting.md");
 const FREE: [&str; 4] = ["options", "subdomains[].sizes.options", "findings", "measures.chunks"];
 
 /// The commands of each section, in order. The surfaces are written first.
-const RUNS: [(&str, &[&str]); 19] = [
+const RUNS: [(&str, &[&str]); 20] = [
     ("sample", &["sample box,h=0.045 -o box.stl", "sample sphere,h=0.2 -o sphere.stl"]),
     (
         "check",
@@ -66,8 +66,10 @@ const RUNS: [(&str, &[&str]); 19] = [
             "field a.tetdb add T --at vertices --from x",
             "field a.tetdb list",
             "field a.tetdb drop T",
+            "field a.tetdb add q --at tets --from x",
         ],
     ),
+    ("transfer", &["transfer a.tetdb wells.tetdb"]),
     ("snapshot", &["snapshot a.tetdb a.svg"]),
     ("report", &["report a.tetdb a.html"]),
     (

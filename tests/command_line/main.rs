@@ -38,6 +38,7 @@ mod streams;
 mod subdomains;
 mod tasks;
 mod together;
+mod transfer;
 mod walls;
 mod wires;
 mod wrap;

@@ -11,6 +11,7 @@ mod show;
 mod store;
 mod surface;
 mod tasks;
+mod transfer;
 mod words;
 
 use clap::{Parser, Subcommand};
@@ -29,6 +30,7 @@ pub use surface::{
     WrapArgs, WrapLengths,
 };
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
+pub use transfer::TransferArgs;
 
 /// Fills a closed triangle surface with tetrahedra.
 #[derive(Debug, Parser)]
@@ -99,6 +101,11 @@ pub enum Command {
     ///
     /// Fields have a value at each vertex or tetrahedron. `tetdb query`, exports and pictures take them by name.
     Field(Box<FieldArgs>),
+    /// Evaluate fields of a store on the mesh of another
+    ///
+    /// They are added to it under their names, in one step; Ctrl-C leaves it as it was. Outside of the old mesh, values are those of its
+    /// nearest point.
+    Transfer(TransferArgs),
     /// Prove that a store holds a valid mesh
     ///
     /// All tetrahedra positive by exact signs, each face paired or on the surface, each input triangle there, checksums and digest as they
@@ -163,6 +170,7 @@ impl Command {
             Self::Digest(a) => a.json,
             Self::Query(a) => a.json,
             Self::Field(a) => a.is_json(),
+            Self::Transfer(a) => a.read.json,
             Self::Verify(a) => a.read.json,
             Self::Compare(a) => a.read.json,
             Self::Export(a) => a.read.json,

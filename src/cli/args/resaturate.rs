@@ -49,7 +49,7 @@ pub struct ResaturateArgs {
     /// Mesh damaged sub-domains again as they were; without --subdomain all that are damaged
     #[arg(long, help_heading = None)]
     pub repair: bool,
-    /// Drop all fields of the store first; without it, a store with fields stays as it is
+    /// Drop all fields of the store; without it, their values are evaluated on the new mesh
     #[arg(long, conflicts_with_all = ["undo", "forget", "dry_run"], help_heading = None)]
     pub drop_fields: bool,
     #[command(flatten)]

@@ -166,7 +166,7 @@ impl Store {
         })
     }
 
-    fn change_fields<T>(
+    pub(super) fn change_fields<T>(
         &mut self,
         change: impl FnOnce(&mut Catalog, &Settings) -> Result<T, Error>,
     ) -> Result<T, Error> {
@@ -210,7 +210,7 @@ fn shown(row: FieldRow, parts: &[FieldPart]) -> Field {
     }
 }
 
-fn field_called(catalog: &mut Catalog, name: &str) -> Result<FieldRow, Error> {
+pub(super) fn field_called(catalog: &mut Catalog, name: &str) -> Result<FieldRow, Error> {
     let fields = catalog.fields()?;
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
     fields.into_iter().find(|field| field.name == name).ok_or_else(|| {
@@ -225,16 +225,20 @@ fn field_called(catalog: &mut Catalog, name: &str) -> Result<FieldRow, Error> {
 /// Drops a field with all its values, in one step.
 fn drop_values(catalog: &mut Catalog, field: &FieldRow) -> Result<(), Error> {
     let clock = Instant::now();
-    let parts = catalog.field_parts()?;
+    let (parts, previous) = (catalog.field_parts()?, catalog.previous_field_parts()?);
     let state = catalog.state()?;
     Ok(catalog.commit(|step| {
-        step.remove_field(field, &parts);
+        step.remove_field(field, &parts, &previous);
         step.append_journal(&journal(state, "drop field", clock));
         Ok(())
     })?)
 }
 
-fn journal(state: tetdb_schema::catalog::StoreState, step: &str, clock: Instant) -> JournalRow {
+pub(super) fn journal(
+    state: tetdb_schema::catalog::StoreState,
+    step: &str,
+    clock: Instant,
+) -> JournalRow {
     let (subdomain, measures) = (None, Vec::new());
     let seconds = clock.elapsed().as_secs_f64();
     JournalRow { state, subdomain, step: step.to_owned(), seconds, measures }

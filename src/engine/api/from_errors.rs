@@ -187,6 +187,9 @@ impl From<PipelineError> for Error {
             PipelineError::Sizing(e) => e.into(),
             PipelineError::Store(e) => e.into(),
             PipelineError::Storage(e) => e.into(),
+            PipelineError::Query(e) => e.into(),
+            PipelineError::LaterFields { .. } => Self::new(Code::BadField, &e)
+                .with_help("drop these fields first, and add them again afterwards"),
             PipelineError::NothingFilled { .. } => Self::new(Code::NothingFilled, &e)
                 .with_help("fill all regions, and look at the surface")
                 .with_remedy(Remedy::General),

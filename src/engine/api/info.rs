@@ -168,6 +168,7 @@ impl StoreInfo {
         let (state, job) = (catalog.state()?, catalog.job()?);
         let rows = catalog.subdomains()?;
         let (previous, fields) = (catalog.previous()?, fields_of(catalog)?);
+        let previous_values = catalog.previous_field_parts()?;
         let (coarse, subdomains) = (catalog.coarse_snapshots()?, subdomains(catalog, &rows)?);
         let stages = catalog.stages()?.into_iter();
         let all = (rows.iter()).map(|r| Aabb::around(r.bounds.map(Point::from_array)));
@@ -191,7 +192,8 @@ impl StoreInfo {
             bounds: [all.low, all.high].map(|p| p.to_array()),
             bytes: rows.iter().map(|r| r.bytes).sum(),
             coarse_bytes: coarse.iter().map(|c| c.bytes).sum(),
-            previous_bytes: previous.iter().map(|r| r.bytes).sum(),
+            previous_bytes: previous.iter().map(|r| r.bytes).sum::<u64>()
+                + previous_values.iter().map(|part| part.bytes).sum::<u64>(),
             field_bytes: fields.iter().map(|field| field.bytes).sum(),
             fields,
             catalog_bytes: catalog.file_bytes()?,

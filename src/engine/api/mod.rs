@@ -16,7 +16,7 @@
 //! | `store`, `info`, `names`, `located`, `compare` | a finished store; records; names; points in tetrahedra; two meshes compared |
 //! | `verify`, `verify_shared`, `verify_server` | verification, by one or several processes |
 //! | `ask`, `condition`, `answer_rows`, `answer_file` | questions and their answers |
-//! | `fields`, `field_spec`, `field_sources` | values kept with a finished mesh |
+//! | `fields`, `field_spec`, `field_sources`, `transfer` | values kept with a finished mesh, and brought to another |
 //! | `import` | a mesh made by another program as a store |
 //! | `remesh`, `remesh_sizes` | meshing sub-domains again |
 //! | `tasks`, `tasks_status` | one mesh by the tasks of a batch scheduler |
@@ -77,6 +77,7 @@ mod surface_wrap;
 pub mod targets;
 mod tasks;
 mod tasks_status;
+mod transfer;
 mod verify;
 #[cfg(any(test, feature = "mpi"))]
 mod verify_server;
@@ -151,4 +152,6 @@ pub use tetdb_schema::labels::LabelSet;
 pub use tetdb_schema::source::BOUNDARY_OF as BOUNDARY_PREFIX;
 pub use tetdb_schema::word::Word;
 pub use tetdb_store::audit::{Population, Qualities};
+pub use tetdb_store::transfer::TransferMethod;
+pub use transfer::TransferredField;
 pub use verify::{Verification, VerifyLevel};

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::preflight::scratch_beside;
 use super::remesh_sizes::{Lengths, RemeshSizes};
 use super::store::{open_finished, open_to_change};
-use super::{Error, Settings, Sizes, Store, Surface, field_spec, guarded, job, verify};
+use super::{Error, Settings, Sizes, Store, Surface, TransferredField, guarded, job, verify};
 use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Values};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::code::Code;
@@ -58,6 +58,8 @@ pub struct Remeshed {
     pub subdomains: Vec<[SubdomainRow; 2]>,
     /// Number of vertices inserted into each sub-domain; `None` for a restored older version. Shape: parallel to `subdomains`.
     pub inserted_vertices: Vec<Option<u64>>,
+    /// Fields of the store, evaluated on the changed sub-domains.
+    pub fields: Vec<TransferredField>,
     /// Pages read from scratch files.
     pub pages_read: u64,
     /// Pages written to scratch files.
@@ -84,7 +86,8 @@ impl Store {
         Remesh::new(path, settings)
     }
 
-    /// Restores the sub-domains that the last [`Store::remesh`] replaced. Errors: `nothing-to-undo`.
+    /// Restores the sub-domains that the last [`Store::remesh`] replaced, with the values of their fields. Errors: `nothing-to-undo`;
+    /// `bad-field` for a field that was added since.
     pub fn undo(self) -> Result<Self, Error> {
         Ok(self.undo_reported(false)?.store)
     }
@@ -95,7 +98,6 @@ impl Store {
         let summary = guarded(&settings, || {
             let mut catalog = open_to_change(&path, &settings)?;
             let lock = catalog.lock();
-            refuse_fields(&mut catalog)?;
             let summary = pipeline::undo(&mut catalog)?;
             catalog.close()?;
             if let (true, Some(lock)) = (verify, lock) {
@@ -183,7 +185,7 @@ impl Remesh {
         self
     }
 
-    /// Drops all fields of the store together with the old mesh. Otherwise a store with fields is refused: their values belong to the mesh as it is.
+    /// Drops all fields of the store together with the old mesh. Otherwise their values are evaluated on the new mesh.
     pub fn drop_fields(mut self) -> Self {
         self.drop_fields = true;
         self
@@ -243,9 +245,6 @@ impl Remesh {
             return Ok(None);
         }
         check_recipe(&mut open, self.repair, &self.settings)?;
-        if !self.drop_fields {
-            refuse_fields(&mut open)?;
-        }
         let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
         let summary = pipeline::resaturate(&mut open, &options, &request, &budget, &watch)?;
         open.close()?;
@@ -274,15 +273,18 @@ impl Remesh {
             (RemeshRanks::Listed(ranks), _) if self.repair && ranks.is_empty() => damaged(open)?,
             _ => listed,
         };
-        Ok((options, Resaturation { ranks, sizes, repair: self.repair }))
+        let (repair, drop_fields) = (self.repair, self.drop_fields);
+        Ok((options, Resaturation { ranks, sizes, repair, drop_fields }))
     }
 }
 
 impl Remeshed {
     fn new(store: Store, summary: ResaturateSummary) -> Result<Self, Error> {
+        let fields = store.transferred(summary.fields)?;
         let inserted = summary.parts.iter().map(|part| part.fine.as_ref());
         Ok(Self {
             store,
+            fields,
             inserted_vertices: inserted.map(|fine| fine.map(|f| f.refine.inserted)).collect(),
             pages_read: summary.pages.pages_read,
             pages_written: summary.pages.pages_written,
@@ -290,20 +292,6 @@ impl Remeshed {
             subdomains: summary.parts.into_iter().map(|part| [part.before, part.after]).collect(),
         })
     }
-}
-
-/// Refuses a store with fields: their values would be lost.
-fn refuse_fields(open: &mut Catalog) -> Result<(), Error> {
-    let fields = open.fields()?;
-    if fields.is_empty() {
-        return Ok(());
-    }
-    let names: Vec<&str> = fields.iter().map(|field| &*field.name).collect();
-    let message = format!(
-        "the store has fields ({}), whose values belong to the mesh as it is",
-        names.join(", ")
-    );
-    Err(field_spec::bad(message).with_help("drop the fields first, and add them again afterwards"))
 }
 
 /// A repair must follow the recipe that began the store. Any other change only reports that the recipe differs.

@@ -9,6 +9,7 @@ use tetdb_base::storage::StorageError;
 use tetdb_base::surface::SurfaceError;
 use tetdb_kernel::boundary::BoundaryError;
 use tetdb_kernel::sizing::SizingError;
+use tetdb_store::query::QueryError;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::StoreError;
 
@@ -31,6 +32,9 @@ pub enum PipelineError {
     /// The store could not be read or written.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// The mesh before could not be read.
+    #[error(transparent)]
+    Query(#[from] QueryError),
     /// Pages could not be read, written or held.
     #[error(transparent)]
     Storage(#[from] StorageError),
@@ -100,6 +104,12 @@ pub enum PipelineError {
     NothingToUndo {
         /// Directory of the store.
         path: std::path::PathBuf,
+    },
+    /// Fields were added after the last change, so the version before it has no values of theirs.
+    #[error("the version before has no values of {}, added after it", .names.join(", "))]
+    LaterFields {
+        /// Names of the fields.
+        names: Vec<String>,
     },
     /// The number of lengths differs from the number of tetrahedra or vertices of the sub-domains.
     #[error(

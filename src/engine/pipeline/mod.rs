@@ -38,8 +38,8 @@ pub use plan::{
 pub use progress::silent;
 pub use progress::{Event, Watcher};
 pub use remesh::{
-    Forecast, NewSizes, ResaturateSummary, Resaturated, Resaturation, Values, changed, forecast,
-    forget, recorded_request, resaturate, undo,
+    FieldChange, Forecast, NewSizes, ResaturateSummary, Resaturated, Resaturation, Values, changed,
+    forecast, forget, recorded_request, resaturate, undo,
 };
 pub use tasks::serve;
 pub use tasks::{

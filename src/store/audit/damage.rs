@@ -87,6 +87,20 @@ impl DamageFound {
                 self.note(checked)?;
             }
         }
+        self.add_previous_fields(store)
+    }
+
+    fn add_previous_fields(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
+        let (rows, fields) = (store.previous()?, store.fields()?);
+        for part in store.previous_field_parts()? {
+            let row = rows.iter().find(|row| row.rank == part.rank);
+            let field = fields.iter().find(|field| field.id == part.field);
+            let (Some(row), Some(field)) = (row, field) else { continue };
+            let Ok(mesh) = store.open_row(row.clone(), MEMORY_BYTES) else { continue };
+            let opened = store.open_field(field, &mesh, MEMORY_BYTES);
+            let checked = opened.and_then(|mut values| Ok(values.check()?));
+            self.note(checked)?;
+        }
         Ok(())
     }
 

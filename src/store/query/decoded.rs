@@ -10,7 +10,7 @@ use tetdb_schema::record::SealedTet;
 
 /// A tetrahedron of a frame.
 #[derive(Clone, Copy)]
-pub(super) struct FrameTet {
+pub(crate) struct FrameTet {
     /// Number of the tetrahedron in the sub-domain.
     pub local: u32,
     pub region: u32,
@@ -18,16 +18,18 @@ pub(super) struct FrameTet {
     pub nodes: [u32; 4],
 }
 
-/// Shape: `tets` ascending by number; `points[v]`, `ids[v]` = position and lasting id of vertex `v` of the frame.
-pub(super) struct DecodedChunk {
+/// Shape: `tets` ascending by number; `points[v]`, `ids[v]`, `locals[v]` = position, lasting id and number of vertex `v` of the frame.
+pub(crate) struct DecodedChunk {
     part: SubdomainId,
     pub tets: Vec<FrameTet>,
     points: Vec<Point>,
     ids: Vec<u64>,
+    /// Numbers of the vertices in the sub-domain.
+    locals: Vec<u32>,
 }
 
 /// A frame of a whole chunk, and a tree to find points in it.
-pub(super) struct Searched {
+pub(crate) struct Searched {
     pub frame: DecodedChunk,
     pub tree: OctalBoxTree,
 }
@@ -42,23 +44,22 @@ impl DecodedChunk {
         mut keep: impl FnMut(&Subdomain, u32, &SealedTet) -> bool,
     ) -> Result<Self, StoreError> {
         let mut places: IdMap<u32, u32> = IdMap::default();
-        let mut frame =
-            Self { part: part.id(), tets: Vec::new(), points: Vec::new(), ids: Vec::new() };
-        let mut locals = Vec::new();
+        let (tets, points, ids, locals) = Default::default();
+        let mut frame = Self { part: part.id(), tets, points, ids, locals };
         for (local, tet) in (chunk.first..).zip(&chunk.records) {
             if !keep(part, local, tet) {
                 continue;
             }
             let nodes = tet.nodes.map(|v| {
                 *places.entry(v).or_insert_with(|| {
-                    locals.push(v);
-                    locals.len() as u32 - 1
+                    frame.locals.push(v);
+                    frame.locals.len() as u32 - 1
                 })
             });
             frame.tets.push(FrameTet { local, region: tet.region, nodes });
         }
         // In order, so that each chunk of vertices is wanted once.
-        let mut order: Vec<(u32, u32)> = locals.into_iter().zip(0..).collect();
+        let mut order: Vec<(u32, u32)> = frame.locals.iter().copied().zip(0..).collect();
         order.sort_unstable();
         frame.points.resize(order.len(), Point::ZERO);
         frame.ids.resize(order.len(), 0);
@@ -70,12 +71,21 @@ impl DecodedChunk {
         Ok(frame)
     }
 
+    #[inline]
     pub fn corners(&self, tet: &FrameTet) -> [Point; 4] {
-        tet.nodes.map(|v| self.points[v as usize])
+        // Not `map`, which stays a call: it took a sixth of the time of overlaps.
+        let [a, b, c, d] = tet.nodes;
+        let at = |v: u32| self.points[v as usize];
+        [at(a), at(b), at(c), at(d)]
     }
 
     pub fn ids(&self, tet: &FrameTet) -> [u64; 4] {
         tet.nodes.map(|v| self.ids[v as usize])
+    }
+
+    /// Numbers of the vertices in the sub-domain.
+    pub fn locals(&self, tet: &FrameTet) -> [u32; 4] {
+        tet.nodes.map(|v| self.locals[v as usize])
     }
 
     /// Lasting id of a tetrahedron.
@@ -94,6 +104,7 @@ impl DecodedChunk {
         self.tets.capacity() * size_of::<FrameTet>()
             + self.points.capacity() * size_of::<Point>()
             + self.ids.capacity() * 8
+            + self.locals.capacity() * 4
     }
 }
 

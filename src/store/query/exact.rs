@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use tetdb_base::geom::{Dyadic, Point};
 
 /// A number that can be added and multiplied, and whose sign may be known.
-pub(super) trait Ring: Clone {
+pub(crate) trait Ring: Clone {
     fn from_f64(x: f64) -> Self;
     fn plus(&self, other: &Self) -> Self;
     fn minus(&self, other: &Self) -> Self;
@@ -83,7 +83,7 @@ impl Ring for Dyadic {
 
 /// A vector of such numbers.
 #[derive(Clone)]
-pub(super) struct Vector<R>([R; 3]);
+pub(crate) struct Vector<R>([R; 3]);
 
 impl<R: Ring> Vector<R> {
     pub fn from_point(p: Point) -> Self {

@@ -36,10 +36,15 @@ impl ExtraRanges {
 
 impl QuerySession {
     /// The open values of a field in a sub-domain.
-    fn field(&mut self, field: &FieldRow, rank: u32) -> Result<&mut FieldFile, QueryError> {
+    pub(crate) fn field(
+        &mut self,
+        field: &FieldRow,
+        rank: u32,
+    ) -> Result<&mut FieldFile, QueryError> {
         let key = (field.id, rank);
         if !self.fields.contains(&key) {
-            while self.fields.len() >= FILES_MAX {
+            let is_full = |session: &Self| session.budget.available() < FILE_BYTES;
+            while self.fields.len() >= FILES_MAX || !self.fields.is_empty() && is_full(self) {
                 self.fields.pop_lru();
             }
             let lease = self.budget.lease(FILE_BYTES, "values of a field")?;

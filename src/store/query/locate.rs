@@ -60,7 +60,7 @@ impl Search {
 }
 
 /// Six times the volumes of the point with each face, or `None` where one is negative: signs are exact.
-fn shares(corners: &[Point; 4], p: Point) -> Option<[f64; 4]> {
+pub(crate) fn shares(corners: &[Point; 4], p: Point) -> Option<[f64; 4]> {
     let mut shares = [0.0; 4];
     for i in 0..4 {
         let mut with = *corners;
@@ -75,7 +75,7 @@ fn shares(corners: &[Point; 4], p: Point) -> Option<[f64; 4]> {
 }
 
 /// Returns whether a box holds a point.
-pub(super) fn holds(bounds: &Aabb, p: Point) -> bool {
+pub(crate) fn holds(bounds: &Aabb, p: Point) -> bool {
     bounds.low.cmple(p).all() && p.cmple(bounds.high).all()
 }
 

@@ -29,13 +29,16 @@ mod surface_faces;
 mod tree;
 
 pub use error::QueryError;
+pub(crate) use exact::Vector;
 pub use extra::ExtraVariable;
 pub use hit::{EXTRA_MAX, Hit, VARIABLES};
 pub use locate::LocatedPoint;
+pub(crate) use locate::{holds, shares};
 pub use order::Ordered;
 pub use select::Selected;
 pub use selection::{Selection, Sharing};
 pub use session::checked_chunk;
 pub use session::regions_called;
 pub use session::{Measures, QuerySession};
+pub(crate) use session::{bounds_of, chunk_bounds};
 pub use solid::Solid;

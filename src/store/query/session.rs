@@ -46,7 +46,7 @@ pub struct Measures {
 pub struct OpenSubdomain {
     pub subdomain: Subdomain,
     /// Over the boxes of its chunks of tetrahedra.
-    pub(super) tree: OctalBoxTree,
+    pub(crate) tree: OctalBoxTree,
     _lease: Option<Lease>,
 }
 
@@ -101,7 +101,7 @@ pub struct QuerySession {
     /// Embedded edges and points.
     pub wires: WiresRow,
     /// Over the boxes of the sub-domains.
-    pub(super) tree: OctalBoxTree,
+    pub(crate) tree: OctalBoxTree,
     bounds: Aabb,
     pub(super) parts: LruCache<u32, OpenSubdomain>,
     parts_max: usize,
@@ -151,7 +151,8 @@ impl QuerySession {
         Ok(session)
     }
 
-    fn open_rows(
+    /// Opens questions to these sub-domains, of which each may be a previous version. Errors: as [`QuerySession::open`].
+    pub fn open_rows(
         mut store: Catalog,
         rows: Vec<SubdomainRow>,
         budget: &Budget,
@@ -274,7 +275,7 @@ impl QuerySession {
     }
 
     /// A whole chunk, decoded.
-    pub(super) fn searched(&mut self, rank: u32, chunk: u32) -> Result<Arc<Searched>, QueryError> {
+    pub(crate) fn searched(&mut self, rank: u32, chunk: u32) -> Result<Arc<Searched>, QueryError> {
         if let Some(frame) = self.frames.get(&(rank, chunk)) {
             return Ok(Arc::clone(frame));
         }

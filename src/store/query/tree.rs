@@ -8,7 +8,7 @@ const FAN: usize = 8;
 /// Shape: `levels[0][i]` = box around items `8 i..8 i + 8`; each level above holds eight boxes of the one below.
 ///
 /// Items themselves are not kept: callers test the eight.
-pub(super) struct OctalBoxTree {
+pub(crate) struct OctalBoxTree {
     levels: Vec<Vec<Aabb>>,
     n: usize,
 }

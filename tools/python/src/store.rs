@@ -9,7 +9,7 @@ use serde_json::json;
 use tetdb::data::Hit;
 use tetdb::{
     CancelToken, ColorBy, ExportOptions, FieldIds, FieldPlace, FieldSource, NewField, Order,
-    Snapshot, VerifyLevel, Word,
+    Snapshot, TransferMethod, VerifyLevel, Word,
 };
 
 use crate::failure::Failure;
@@ -396,6 +396,25 @@ impl Store {
 
     fn drop_field(&self, py: Python<'_>, name: &str) -> PyResult<()> {
         self.changed(py, None, |mut store| Ok(store.drop_field(name)?))
+    }
+
+    /// Adds fields of the store at `path`; says how they were evaluated, as JSON.
+    fn transfer(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        names: Vec<String>,
+        method: Option<&str>,
+    ) -> PyResult<String> {
+        let method = method.and_then(TransferMethod::from_word);
+        let mut said = String::new();
+        self.changed(py, None, |mut store| {
+            let from = tetdb::Store::open(&path)?;
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            said = json!(store.transfer_from(&from, &names, method)?).to_string();
+            Ok(())
+        })?;
+        Ok(said)
     }
 
     fn undo(&self, py: Python<'_>) -> PyResult<()> {

@@ -45,9 +45,29 @@ def test_dropping_and_refusing(st: tetdb.Store) -> None:
     assert refused.value.code == "bad-field"
     with pytest.raises(tetdb.TetdbError):
         st.fields["U"] = np.zeros(3)
-    with pytest.raises(tetdb.TetdbError):
-        st.resaturate(0, scale=0.8)
     del st.fields["T"]
     assert not st.fields and "T" not in st.fields
     with pytest.raises(KeyError):
         st.fields["T"]
+
+
+def test_going_to_another_mesh(st: tetdb.Store, tmp_path: Path) -> None:
+    other = tetdb.mesh(tetdb.sample("box,h=0.2"), tmp_path / "other.tetdb", hsiz=0.15)
+    st.fields.add("T", "300 + x - 2*y")
+    st.fields.add("heat", "1 + x*y", at="tets")
+    linear, overlap = other.transfer(st)
+    assert (linear["method"], overlap["method"], linear["from_outside"]) == ("linear", "overlap", 0)
+    before, after = overlap["integrals"]
+    assert np.allclose(before, after, rtol=1e-12)
+    x, y, _ = other.subdomain(0).points.T
+    assert np.allclose(other.fields["T"].array(), 300 + x - 2 * y, rtol=1e-12)
+    with pytest.raises(tetdb.TetdbError) as refused:
+        other.transfer(st, "T")
+    assert refused.value.code == "bad-field"
+    with pytest.raises(tetdb.TetdbError):
+        other.transfer(st, ["T"], method="cubic")
+    digest = other.fields["T"].digest
+    other.resaturate(0, scale=0.8)
+    assert other.fields["T"].digest != digest
+    other.undo()
+    assert other.fields["T"].digest == digest

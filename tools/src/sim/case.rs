@@ -100,7 +100,12 @@ impl Case {
             beta: self.options.mesh.sizes.beta(),
             requested: "{}".to_owned(),
         };
-        let what = Resaturation { ranks: [2, 5].into(), sizes: Some(sizes), repair: false };
+        let what = Resaturation {
+            ranks: [2, 5].into(),
+            sizes: Some(sizes),
+            repair: false,
+            drop_fields: false,
+        };
         let mut catalog = Catalog::open_writable(self.store(disk))?;
         let budget = Budget::new(self.budget);
         pipeline::resaturate(&mut catalog, &self.options, &what, &budget, &silent)?;

@@ -1,5 +1,6 @@
 //! Remeshing of sub-domains of a finished store, and its undo.
 
+mod fields;
 mod previous;
 mod request;
 mod resaturate;
@@ -11,4 +12,4 @@ pub use previous::{forget, undo};
 pub use request::Resaturation;
 pub use resaturate::{Forecast, changed, forecast, recorded_request, resaturate};
 pub use sizes::{NewSizes, Values};
-pub use summary::{ResaturateSummary, Resaturated};
+pub use summary::{FieldChange, ResaturateSummary, Resaturated};

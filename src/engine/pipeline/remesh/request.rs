@@ -14,4 +14,6 @@ pub struct Resaturation {
     /// True if the file of each sub-domain is damaged. The new mesh must then equal the one recorded in the catalog, and the
     /// damaged file does not become a previous version.
     pub repair: bool,
+    /// True to drop all fields of the store. Otherwise their values are evaluated on the new mesh.
+    pub drop_fields: bool,
 }

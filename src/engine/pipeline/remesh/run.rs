@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::fields::FieldChanges;
 use super::previous::Previous;
 use super::request::Resaturation;
 use super::sizes::{Recorded, Values};
@@ -19,7 +20,7 @@ use crate::pipeline::work::soundness::{check_owners, panic_is_damage_of};
 use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::workers::{WorkerFn, map_bounded};
 use tetdb_base::geom::{Aabb, Point};
-use tetdb_base::storage::{Backing, Budget, DiskPath, PagerStats, ScratchSpace, attempt};
+use tetdb_base::storage::{Backing, Budget, DiskPath, ScratchSpace, attempt};
 use tetdb_kernel::mesh::Workspace;
 use tetdb_kernel::sizing::{BackgroundMesh, SizeField};
 use tetdb_schema::blob::{Blob, BlobContent};
@@ -208,7 +209,7 @@ impl<'a> RemeshRun<'a> {
         let _fields = budget.lease(held, "the size fields")?;
         let plan = Plan::new(budget.cap(), held)?;
         let leased = plan.frames + plan.redb + plan.redb / 2 + plan.buffers;
-        let _lease = budget.lease(leased, "the working mesh")?;
+        let lease = budget.lease(leased, "the working mesh")?;
         let bounds = tree::bounds(self.catalog)?;
         let workers = plan.workers().min(self.rows.len()).max(1);
         let share = plan.shared_by(workers as u64).without_file();
@@ -229,7 +230,8 @@ impl<'a> RemeshRun<'a> {
             },
         )?;
         let (again, finished) = state;
-        again.commit(finished, &made)
+        drop(lease);
+        again.commit(finished, &made, (budget.available(), watch))
     }
 
     fn job(
@@ -277,6 +279,7 @@ impl<'a> RemeshRun<'a> {
         &mut self,
         finished: BTreeMap<u32, FinishedSubdomain>,
         made: &BTreeMap<u32, Vec<u8>>,
+        (memory, watch): (u64, &Watcher),
     ) -> Result<ResaturateSummary, PipelineError> {
         let (mut totals, mut old_blobs) = (BTreeMap::new(), Vec::new());
         let mut is_new = self.what.repair;
@@ -285,7 +288,8 @@ impl<'a> RemeshRun<'a> {
             // Interface faces stay under any sizes, and a repair must restore the whole sub-domain. Otherwise the coarse snapshot
             // is a different one.
             let has_other_faces = sealed.row.interface_digest != row.interface_digest;
-            if has_other_faces || self.what.repair && sealed.row.digest != row.digest {
+            let is_same = sealed.row.digest == row.digest && sealed.row.chunks == row.chunks;
+            if has_other_faces || self.what.repair && !is_same {
                 return Err(StoreError::Sealed(SealedError::Content {
                     path: self.catalog.dir().to_owned(),
                     subdomain: rank,
@@ -307,7 +311,14 @@ impl<'a> RemeshRun<'a> {
         }
         let regions = sum_totals(self.catalog, self.n, &totals)?.regions;
         let dropped = Previous::of(self.catalog)?;
-        let (fields, values) = (self.catalog.fields()?, self.catalog.field_parts()?);
+        let changed =
+            |(row, _): &(SubdomainRow, _)| [row.clone(), finished[&row.rank].sealed.row.clone()];
+        let changed: Vec<[SubdomainRow; 2]> = self.rows.iter().map(changed).collect();
+        let fields = match (self.what.drop_fields, self.what.repair) {
+            (true, _) => FieldChanges::drop_all(self.catalog)?,
+            (false, true) => FieldChanges::keep(self.catalog, &changed)?,
+            (false, false) => FieldChanges::evaluate(self.catalog, &changed, memory, watch)?,
+        };
         let (what, rows, clock) = (self.what, &self.rows, self.clock);
         let requested = what.sizes.as_ref().map(|sizes| sizes.requested.as_bytes());
         let step_name = match what.repair {
@@ -350,13 +361,12 @@ impl<'a> RemeshRun<'a> {
                 journal.subdomain = Some(rank);
                 step.append_journal(&journal);
             }
-            // Their values are of the old mesh. A caller that keeps them refuses the change before.
-            fields.iter().for_each(|field| step.remove_field(field, &values));
+            fields.list(step, !what.repair);
             step.set_regions(&regions);
             step.set_state(StoreState::Sealed);
             Ok(())
         })?;
-        Ok(self.summary(finished))
+        Ok(ResaturateSummary { fields: fields.evaluated, ..self.summary(finished) })
     }
 
     /// Handles an unchanged result: drops the new files. The version before the last change can still be restored.
@@ -379,8 +389,7 @@ impl<'a> RemeshRun<'a> {
             // The scratch folder has no data of the store.
             let _ = scratch.remove_dir_all();
         }
-        let mut summary =
-            ResaturateSummary { parts: Vec::new(), pages: PagerStats::default(), frames_used: 0 };
+        let mut summary = ResaturateSummary::default();
         for ((before, _), subdomain) in self.rows.iter().zip(finished.into_values()) {
             summary.pages.add(subdomain.pages);
             summary.frames_used = summary.frames_used.max(subdomain.frames_used);

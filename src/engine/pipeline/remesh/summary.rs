@@ -3,6 +3,8 @@
 use crate::pipeline::work::FineReport;
 use tetdb_base::storage::PagerStats;
 use tetdb_schema::catalog::SubdomainRow;
+use tetdb_schema::field::FieldRow;
+use tetdb_store::transfer::{TransferMethod, Transferred};
 
 /// Rows of a sub-domain before and after remeshing.
 #[derive(Clone, Debug)]
@@ -15,11 +17,24 @@ pub struct Resaturated {
     pub fine: Option<FineReport>,
 }
 
+/// A field that was evaluated on the new mesh.
+#[derive(Clone, Debug)]
+pub struct FieldChange {
+    /// The field.
+    pub field: FieldRow,
+    /// How its values were evaluated.
+    pub method: TransferMethod,
+    /// Its values in the changed sub-domains.
+    pub values: Transferred,
+}
+
 /// Report of a remeshing run.
 #[derive(Clone, Debug, Default)]
 pub struct ResaturateSummary {
     /// The changed sub-domains, by rank.
     pub parts: Vec<Resaturated>,
+    /// Fields of the store, evaluated on the changed sub-domains.
+    pub fields: Vec<FieldChange>,
     /// Pages read and written.
     pub pages: PagerStats,
     /// Largest number of pages held in memory at once.

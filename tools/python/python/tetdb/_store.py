@@ -716,6 +716,41 @@ class Store:
         }
         self._changed(lambda: self._native.resaturate(job, _options.listener(progress)))
 
+    def transfer(
+        self,
+        other: Store,
+        fields: str | Sequence[str] | None = None,
+        method: str | None = None,
+    ) -> list[dict[str, Any]]:
+        """Adds fields of another store, evaluated on this mesh.
+
+        Parameters
+        ----------
+        other : Store
+            The store that has the fields.
+        fields : str or list of str, optional
+            Their names; left out, all.
+        method : str, optional
+            `linear` for values at vertices, `overlap` for those at tetrahedra, or `nearest`; left out, the first two.
+
+        Returns
+        -------
+        list of dict
+            For each field its name, `method`, `from_outside` (values of places outside of the other mesh), and at tetrahedra `covered` and
+            `integrals` before and after.
+        """
+        if method not in (None, "linear", "overlap", "nearest"):
+            raise _options.usage(f"{method!r} is no method: expected 'linear', 'overlap' or 'nearest'", "method")
+        names = [fields] if isinstance(fields, str) else list(fields or [])
+        said = "[]"
+
+        def work() -> None:
+            nonlocal said
+            said = self._native.transfer(other.path, names, method)
+
+        self._changed(work)
+        return list(json.loads(said))
+
     def repair(self, subdomains: Sequence[int] = ()) -> None:
         """Meshes damaged sub-domains again as they were; without a list, all that are damaged."""
         ranks = _options.ranks(subdomains, "subdomains")
