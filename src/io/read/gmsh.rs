@@ -12,6 +12,7 @@ use super::solids::Solids;
 use super::tets::TetSink;
 use super::{ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
+use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::NoteKind;
 
 /// State of a reader that all sections of a file share.
@@ -399,12 +400,16 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     fn read_nodes_4(&mut self) -> Result<()> {
         let (n_blocks, n_total) = self.block_header("nodes", 4)?;
         let mut found = 0;
-        let mut tags = Vec::new();
+        // A block may have all nodes of the file.
+        let space = match &self.tets {
+            Some(sink) => sink.mesh.space.clone(),
+            None => ScratchSpace::boundless(),
+        };
         for i in 0..n_blocks {
             self.numbers.need_record("blocks", n_blocks, i)?;
             let (dimension, _, parametric, n) = self.block("nodes", 4)?;
             let n_parameters = if parametric != 0 { dimension.clamp(0, 3) } else { 0 };
-            tags.clear();
+            let mut tags = space.builder();
             // In 4.0 each tag stands before its coordinates.
             for k in 0..if self.version == Version::V41 { n } else { 0 } {
                 self.numbers.need_record("nodes", n, k)?;
@@ -412,9 +417,9 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             }
             for k in 0..n {
                 self.numbers.need_record("nodes", n, k)?;
-                let tag = match tags.get(k as usize) {
-                    Some(&tag) => tag,
-                    None => self.tag()?,
+                let tag = match (k as usize) < tags.len() {
+                    true => tags.get(k as usize),
+                    false => self.tag()?,
                 };
                 let p = self.point()?;
                 for _ in 0..n_parameters {

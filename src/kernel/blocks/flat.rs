@@ -2,6 +2,8 @@
 
 use tetdb_schema::page::NONE;
 
+use crate::mesh::anatomy::MARK;
+use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::{FaceRef, Tet};
 use tetdb_base::geom::{Point, orient};
 
@@ -127,6 +129,11 @@ impl FlatMesh {
     #[inline(always)]
     pub fn is_held(&self, t: u32) -> bool {
         self.held[t as usize]
+    }
+
+    /// Whether there are tetrahedra that division has not examined.
+    pub fn has_unexamined(&self) -> bool {
+        self.tets.iter().any(|tet| tet.is_live() && tet.node[EXAMINED] & MARK == 0)
     }
 
     /// Whether all tetrahedra are positive and neighbors agree: for assertions.

@@ -29,7 +29,7 @@ mod smooth;
 mod spawn;
 mod tasks;
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use crate::mesh::Mesh;
@@ -114,16 +114,24 @@ fn saturate_at<P: Pages>(
             ..BlockReport::default()
         }),
         inserted: AtomicU64::new(scaffold),
+        left: partition.blocks.iter().map(|_| AtomicBool::new(false)).collect(),
     };
+    let mut told = || progress(visits.inserted.load(Ordering::Relaxed));
     let visit = |visitor: &mut Visitor, task| {
         let (phase, block) = graph.visit(task);
-        visits.visit(visitor, phase, block);
+        visits.visit(visitor, phase, block, false);
     };
-    graph.run(memory.threads, &Visitor::new, &visit, &mut || {
-        progress(visits.inserted.load(Ordering::Relaxed))
-    });
+    graph.run(memory.threads, &Visitor::new, &visit, &mut told);
     // Shorter lengths divide what coarser ones leave.
     let unexamined = if is_final { visits.finish_rest() } else { 0 };
+    if mode != Mode::None && visits.left.iter().any(|left| left.load(Ordering::Relaxed)) {
+        let visit = |visitor: &mut Visitor, task| match graph.visit(task) {
+            (DIVIDE, _) => {}
+            (_, block) if !visits.left[block].load(Ordering::Relaxed) => {}
+            (phase, block) => visits.visit(visitor, phase, block, true),
+        };
+        graph.run(memory.threads, &Visitor::new, &visit, &mut told);
+    }
     visits.bricks.limit(memory.bricks / 2);
     mesh.pages_mut().use_at_most(memory.pages_at_first);
     let over_constrained = convert::to_pages(&visits.bricks, n_bricks as u32, mesh);
@@ -161,6 +169,8 @@ struct Visits<'a, 'b> {
     bricks: Bricks,
     report: Mutex<BlockReport>,
     inserted: AtomicU64,
+    /// Blocks whose second visit waits until all is divided.
+    left: Vec<AtomicBool>,
 }
 
 /// Scratch of a thread.
@@ -177,22 +187,29 @@ impl Visitor {
 }
 
 impl Visits<'_, '_> {
-    fn visit(&self, visitor: &mut Visitor, phase: usize, id: usize) {
+    /// Visits a block; `is_last` tells whether nothing more will be divided.
+    fn visit(&self, visitor: &mut Visitor, phase: usize, id: usize, is_last: bool) {
         let block = &self.partition.blocks[id];
         let numbers = &block.regions[phase];
         let is_own = |b| block.bricks.contains(&b);
         self.within(visitor, numbers, is_own, |visitor, is_own, own| {
             let color = |b: u32| self.partition.blocks[self.partition.owner(b) as usize].color;
+            let is_left = |b| self.left[self.partition.owner(b) as usize].load(Ordering::Relaxed);
             // What a block could not do, for want of margin, those do that come later.
-            let is_due: Vec<bool> = (numbers.iter().zip(is_own))
-                .map(|(&b, &is_own)| is_own || color(b) < block.color)
-                .collect();
+            let is_before = |b| color(b) < block.color || is_last && !is_left(b);
+            let is_due: Vec<bool> =
+                (numbers.iter().zip(is_own)).map(|(&b, &is_own)| is_own || is_before(b)).collect();
             if phase == DIVIDE {
                 self.divide(visitor, &is_due, own);
                 return;
             }
             if self.n_unexamined(block) > 0 {
                 self.divide(visitor, is_own, own);
+            }
+            // Flips would take tetrahedra that wait for a wider region for divided ones.
+            if !is_last && visitor.region.mesh.has_unexamined() {
+                self.left[id].store(true, Ordering::Relaxed);
+                return;
             }
             visitor.smoother.smooth(&mut visitor.region, is_own);
             if self.mode == Mode::Full {
@@ -234,7 +251,12 @@ impl Visits<'_, '_> {
                 let is_left = |b: u32| left.binary_search(&b).is_ok();
                 let numbers = self.partition.around(&bounds, is_left, margin);
                 self.within(&mut visitor, &numbers, is_left, |visitor, is_own, own| {
+                    let before = visitor.region.mesh.vertices.len() as u32;
                     self.divide(visitor, is_own, own);
+                    for brick in visitor.region.bricks_around(before) {
+                        let owner = self.partition.owner(brick) as usize;
+                        self.left[owner].store(true, Ordering::Relaxed);
+                    }
                 });
             }
         }

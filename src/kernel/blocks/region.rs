@@ -183,6 +183,14 @@ impl Region {
         self.mesh.vertices.len() as u32 - 1
     }
 
+    /// Numbers of the bricks of all tetrahedra around vertices from `first` on, those outside left out, some several times.
+    pub fn bricks_around(&self, first: u32) -> impl Iterator<Item = u32> {
+        let tets = self.mesh.tets.iter().filter(|tet| tet.is_live()).map(Tet::vertices);
+        let near = tets.filter(move |tet| tet.iter().any(|&v| v >= first)).flatten();
+        let places = near.map(|v| self.brick_of[v as usize]).filter(|&place| place != OUTSIDE);
+        places.map(|place| self.bricks[place as usize])
+    }
+
     /// Place in the region of the brick that a tetrahedron belongs to; [`OUTSIDE`] if none of its vertices is in the region.
     #[inline(always)]
     pub fn home(&self, tet: &Tet) -> u32 {

@@ -143,8 +143,11 @@ impl OldMesh {
             let columns = self.columns(fields, rank, chunk)?;
             for (new, cutter) in std::iter::once(first).chain(near) {
                 old.tree.visit(&|b| b.meets(&cutter.bounds), &mut |i| {
-                    let volume = cutter.overlap(&old.frame.corners(&old.frame.tets[i]));
-                    if volume > 0.0 {
+                    let corners = old.frame.corners(&old.frame.tets[i]);
+                    let volume = cutter.overlap(&corners);
+                    let [a, b, c, d] = corners;
+                    let whole = (b - a).cross(c - a).dot(d - a).abs() / 6.0;
+                    if volume > SHARE_MIN * whole.min(cutter.volume()) {
                         covered[new] += volume;
                         for ((sum, field), columns) in sums.iter_mut().zip(fields).zip(&columns) {
                             sum.add(field, new, (columns, i), volume);
@@ -227,6 +230,9 @@ impl OldMesh {
         Ok(all)
     }
 }
+
+/// Least share of the smaller of two tetrahedra: those that only touch share ten times less by rounding.
+const SHARE_MIN: f64 = 1e-13;
 
 /// Adds sums of each field and component.
 pub fn add(all: &mut [Vec<f64>], more: &[Vec<f64>]) {

@@ -4,8 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::FieldTransfer;
 use super::old_mesh::{OldMesh, TargetSlice, TargetValues, add};
+use super::{FieldTransfer, TransferMethod};
 use crate::query::QueryError;
 use crate::sealed::{FieldWriter, Subdomain};
 use crate::store::Catalog;
@@ -209,7 +209,8 @@ impl TransferRun<'_> {
             Transferred {
                 parts,
                 outside: sums.outside,
-                covered: (sums.volumes[1] > 0.0).then(|| sums.volumes[1] / sums.volumes[0]),
+                covered: (fields[i].method == TransferMethod::Overlap)
+                    .then(|| sums.volumes[1] / sums.volumes[0]),
                 integrals: before.map(|all| [all[i].clone(), after]),
             }
         });

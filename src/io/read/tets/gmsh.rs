@@ -3,7 +3,7 @@
 use std::io::BufRead;
 
 use super::gmsh_sink::TetSink;
-use super::raw::{NodeNumbers, RawMesh};
+use super::raw::{Groups, NodeNumbers, RawMesh};
 use super::{Feed, Result};
 use crate::read::SurfaceSink;
 use crate::read::gmsh::GmshReader;
@@ -20,9 +20,14 @@ pub fn read<R: BufRead>(feed: Feed<R>, has_parts: bool, mesh: &mut RawMesh) -> R
     let nodes = NodeNumbers::default();
     reader.tets = Some(TetSink { mesh, nodes, has_parts, last: None, n_repeated: 0 });
     reader.read_sections()?;
-    if let Some(TetSink { mesh, n_repeated: n @ 1.., .. }) = reader.tets {
+    let Some(TetSink { mesh, n_repeated, .. }) = reader.tets else { return Ok(()) };
+    if n_repeated > 0 {
         let text = "[tetrahedron is listed for several groups and belongs|tetrahedra are listed for several groups and belong] to the first";
-        mesh.notes.push(counted(n, text));
+        mesh.notes.push(counted(n_repeated, text));
+    }
+    if has_parts && mesh.parts.list.iter().all(|part| part.0 == 0) {
+        mesh.parts = Groups::default();
+        mesh.notes.push("the file has no partitions; planes divide the mesh".to_owned());
     }
     Ok(())
 }

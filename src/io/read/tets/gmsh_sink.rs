@@ -10,11 +10,12 @@ use tetdb_base::geom::Point;
 
 /// The mesh that a reader of Gmsh files fills.
 pub struct TetSink<'a> {
-    pub(super) mesh: &'a mut RawMesh,
+    pub(in crate::read) mesh: &'a mut RawMesh,
     pub(super) nodes: NodeNumbers,
     pub(super) has_parts: bool,
     /// The last tetrahedron: versions 1 and 2 repeat it for each of its groups.
     pub(super) last: Option<([i64; 4], i64)>,
+    /// Tetrahedra of several groups.
     pub(super) n_repeated: u64,
 }
 
@@ -61,6 +62,7 @@ impl TetSink<'_> {
             (Role::Solid, 4) => {
                 let corners = [find(0)?, find(1)?, find(2)?, find(3)?];
                 let group = groups.first().copied().unwrap_or(0);
+                self.n_repeated += u64::from(groups.len() > 1);
                 let now = std::array::from_fn(|k| tags[k]);
                 match self.last.replace((now, group)) {
                     Some((last, before)) if last == now && before != group => {

@@ -7,8 +7,10 @@ use super::{Feed, ReadFault, Result};
 use tetdb_base::geom::{Point, counted};
 use tetdb_base::storage::{ScratchSpace, SpillVec, SpillVecBuilder, check_cancelled};
 
-/// Most tetrahedra of a mesh: four faces of each have 32-bit numbers.
-const TETS_MAX: usize = 1 << 30;
+/// Most tetrahedra of a mesh: a sub-domain that has all of them cannot be sealed with more.
+const TETS_MAX: usize = 1 << 29;
+/// Most regions: their names are in memory beside all else.
+const GROUPS_MAX: u32 = 1 << 17;
 /// Groups without a number have this one or higher ones.
 const UNNUMBERED: i64 = 1 << 40;
 /// Node numbers may be this many times as far apart as there are nodes. Beyond it, a table of the numbers would be mostly empty.
@@ -16,7 +18,7 @@ const SPARSE_MAX: u64 = 64;
 
 /// A tetrahedral mesh as its file has it, in memory up to a share and in scratch files beyond it.
 pub struct RawMesh {
-    pub(super) space: ScratchSpace,
+    pub(in crate::read) space: ScratchSpace,
     /// Name of the file without folder and ending: the label of triangles that have none.
     pub stem: String,
     /// Positions of the vertices.
@@ -116,7 +118,7 @@ impl RawMesh {
         self.points.push((p + Point::ZERO).to_array());
     }
 
-    /// Adds a tetrahedron. Errors: there are too many.
+    /// Adds a tetrahedron. Errors: there are too many, or too many regions.
     #[inline]
     pub(super) fn tet(
         &mut self,
@@ -127,6 +129,11 @@ impl RawMesh {
         if self.tets.len() >= TETS_MAX {
             let what = format!("a mesh of more than {TETS_MAX} tetrahedra");
             return Err(ReadFault::Unsupported(what));
+        }
+        if region >= GROUPS_MAX {
+            return Err(ReadFault::Unsupported(format!(
+                "a mesh of more than {GROUPS_MAX} regions"
+            )));
         }
         if self.tets.len().is_multiple_of(1 << 16) {
             check_cancelled();

@@ -100,6 +100,17 @@ fn one_mesh_is_the_same_in_every_format() {
 }
 
 #[test]
+fn what_a_gmsh_file_has_too_much_or_too_little_of_is_told() {
+    let fields = MeshFields { part: Some("partition"), region: None };
+    let mesh = read_with(&[("a.msh", GMSH4.as_bytes())], fields).expect("it can be read");
+    assert!(mesh.parts.list.is_empty());
+    assert_eq!(mesh.notes, ["the file has no partitions; planes divide the mesh"]);
+    let two = GMSH4.replacen("1 1 1 1 1 0\n", "1 1 1 2 1 2 0\n", 1);
+    let mesh = read("a.msh", &two).expect("it can be read");
+    assert_eq!(mesh.notes, ["1 tetrahedron is listed for several groups and belongs to the first"]);
+}
+
+#[test]
 fn second_order_tetrahedra_are_taken_by_their_corners() {
     let more = "0.5 0 0 0\n".repeat(6);
     let text = MEDIT
@@ -234,4 +245,15 @@ fn arrays_are_found_by_their_common_name() {
     {
         assert!(all(&tets_of(last, shape)).is_err(), "{last} {shape}");
     }
+}
+
+#[test]
+fn as_many_regions_as_memory_has_no_share_for_are_refused() {
+    let mut mesh = RawMesh::new(ScratchSpace::boundless());
+    for group in 0..1 << 17 {
+        let region = mesh.regions.number(group);
+        assert!(mesh.tet([0, 1, 2, 3], region, 0).is_ok(), "{group}");
+    }
+    let one_more = mesh.regions.number(1 << 17);
+    assert!(mesh.tet([0, 1, 2, 3], one_more, 0).is_err());
 }

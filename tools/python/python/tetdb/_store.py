@@ -742,6 +742,8 @@ class Store:
         if method not in (None, "linear", "overlap", "nearest"):
             raise _options.usage(f"{method!r} is no method: expected 'linear', 'overlap' or 'nearest'", "method")
         names = [fields] if isinstance(fields, str) else list(fields or [])
+        if fields is not None and not names:
+            return []
         said = "[]"
 
         def work() -> None:
