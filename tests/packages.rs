@@ -17,7 +17,7 @@ fn table(path: &str) -> Table {
     read(path).parse().unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// What the workspace says of all its packages.
+/// The table `workspace.package`.
 fn shared() -> Table {
     table("Cargo.toml")["workspace"]["package"].as_table().expect("a table").clone()
 }

@@ -8,7 +8,7 @@ use tetdb_schema::field::{FieldPart, FieldRow};
 use tetdb_store::store::{Catalog, Step, StoreError};
 use tetdb_store::transfer::{FieldTransfer, TransferMethod, transfer};
 
-/// What a change of sub-domains does with the fields of the store.
+/// How fields follow a change of sub-domains.
 #[derive(Default)]
 pub struct FieldChanges {
     /// Values of the changed sub-domains, before and after.
