@@ -43,7 +43,7 @@ impl Store {
     /// # let dir = tempfile::tempdir()?;
     /// # let (old, new) = (dir.path().join("old.tetdb"), dir.path().join("new.tetdb"));
     /// # let mesh = |h, path: &_| tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.5")?).sizes(
-    /// #     tetdb::Sizes::interior(tetdb::Length::absolute(h))).create(path);
+    /// #     tetdb::Sizes::interior(tetdb::Length::units(h))).create(path);
     /// # let (mut old, mut new) = (mesh(0.3, &old)?, mesh(0.2, &new)?);
     /// use tetdb::{FieldPlace, FieldSource, NewField};
     ///
