@@ -84,8 +84,19 @@ fn write_head(value: &mut [u8], address: ChunkAddress, numbers: [u32; 4]) {
     for (bytes, word) in value[8..HEAD_BYTES].chunks_exact_mut(4).zip(words) {
         bytes.copy_from_slice(&word.to_le_bytes());
     }
+    seal(value);
+}
+
+/// Writes the checksum.
+fn seal(value: &mut [u8]) {
     let sum = xxh3_64(&value[8..]);
     value[..8].copy_from_slice(&sum.to_le_bytes());
+}
+
+/// Changes the number of the chunk in the head of a value.
+pub(super) fn renumber(value: &mut [u8], chunk: u32) {
+    value[8 + 4 * 3..][..4].copy_from_slice(&chunk.to_le_bytes());
+    seal(value);
 }
 
 /// Decodes chunks of one kind of record.

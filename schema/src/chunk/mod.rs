@@ -141,7 +141,7 @@ pub enum ChunkDamage {
 }
 
 /// A record that can be stored in chunks.
-pub trait ChunkRecord: Copy {
+pub trait ChunkRecord: Copy + Send + Sync {
     /// The kind of its chunks.
     const KIND: ChunkKind;
     /// Largest number of records of a chunk, whatever their compressed size. Bounds the memory for decoding.

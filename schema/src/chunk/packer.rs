@@ -42,21 +42,49 @@ impl<R: ChunkRecord> Packer<R> {
     ///
     /// Errors: zstd cannot allocate its context.
     pub fn new(subdomain: u32, generation: u32) -> std::io::Result<Self> {
+        Self::at(ChunkAddress { kind: R::KIND, subdomain, generation, chunk: 0 }, 0)
+    }
+
+    fn at(address: ChunkAddress, first: u32) -> std::io::Result<Self> {
         Ok(Self {
-            address: ChunkAddress { kind: R::KIND, subdomain, generation, chunk: 0 },
-            first: 0,
+            address,
+            first,
             guess: (CHUNK_BYTES_MAX / RECORD_BYTES_GUESS).min(R::COUNT_MAX),
             pending: Vec::new(),
             encoder: Encoder::new()?,
         })
     }
 
-    /// Records taken so far.
+    /// A packer that goes on after the chunks that were cut so far, and knows nothing of them: what it cuts depends on its own records alone.
+    ///
+    /// Errors: as [`Packer::new`].
+    pub fn next(&self) -> std::io::Result<Self> {
+        self.beyond(0)
+    }
+
+    /// [`Packer::next`] after `n` more records. Its chunks get their numbers by [`Packer::adopt`].
+    ///
+    /// Errors: as [`Packer::new`].
+    pub fn beyond(&self, n: usize) -> std::io::Result<Self> {
+        Self::at(self.address, self.first + n as u32)
+    }
+
+    /// Takes over the next chunk from a packer [beyond](Packer::beyond) and numbers it.
+    pub fn adopt(&mut self, mut chunk: PackedChunk<R>) -> PackedChunk<R> {
+        assert!(self.pending.is_empty() && chunk.first == self.first, "chunks follow each other");
+        chunk.address.chunk = self.address.chunk;
+        super::codec::renumber(&mut chunk.value, chunk.address.chunk);
+        self.first += chunk.records.len() as u32;
+        self.address.chunk += 1;
+        chunk
+    }
+
+    /// Records taken so far, with those before it.
     pub fn count(&self) -> u64 {
         u64::from(self.first) + self.pending.len() as u64
     }
 
-    /// Chunks cut so far.
+    /// Chunks cut so far, with those before it.
     pub fn chunks(&self) -> u32 {
         self.address.chunk
     }

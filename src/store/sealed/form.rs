@@ -2,12 +2,13 @@
 //!
 //! Both hold the same records in the same order under the same numbers, and readers return the same.
 
+use rayon::prelude::*;
 use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, PackedChunk, Packer};
 use tetdb_schema::page::PageError;
 use tetdb_schema::unsealed::{PageDecoder, PagePacker, PageRecord, PageSet, WorkingWords};
 
 use super::SealedError;
-use tetdb_base::storage::{StorageError, StoreFile};
+use tetdb_base::storage::{StorageError, StoreFile, parallel, spare_threads};
 use tetdb_schema::catalog::SubdomainState;
 use tetdb_schema::word::Word;
 
@@ -75,6 +76,12 @@ impl<R> From<PageSet<R>> for Cut<R> {
     }
 }
 
+/// Records after which chunks begin anew, so that what follows can be packed beside what is before. Some eight full chunks: the last is
+/// not full, and takes a place of its own size.
+pub(super) const fn segment<R: ChunkRecord>() -> usize {
+    8 * R::COUNT_MAX
+}
+
 /// Cuts a stream of records.
 pub(super) enum Cutter<R> {
     Chunks(Box<Packer<R>>),
@@ -96,11 +103,59 @@ impl<R: PageRecord> Cutter<R> {
         &mut self,
         record: R,
         working: impl FnOnce(R) -> WorkingWords,
-    ) -> std::io::Result<Option<Cut<R>>> {
-        Ok(match self {
-            Self::Chunks(packer) => packer.push(record)?.map(Cut::from),
+    ) -> std::io::Result<Vec<Cut<R>>> {
+        let cut = match self {
+            Self::Chunks(packer) => {
+                let cut = packer.push(record)?.map(Cut::from);
+                if packer.count().is_multiple_of(segment::<R>() as u64) {
+                    return self.end_segment(cut);
+                }
+                cut
+            }
             Self::Pages(packer) => packer.push(record, working(record)).map(Cut::from),
-        })
+        };
+        Ok(cut.map_or_else(Vec::new, |cut| vec![cut]))
+    }
+
+    fn end_segment(&mut self, before: Option<Cut<R>>) -> std::io::Result<Vec<Cut<R>>> {
+        let mut cuts = Vec::from_iter(before);
+        while let Some(cut) = self.cut()? {
+            cuts.push(cut);
+        }
+        if let Self::Chunks(packer) = self {
+            **packer = packer.next()?;
+        }
+        Ok(cuts)
+    }
+
+    /// Takes records, whole segments of them side by side where a thread is to spare. Errors: those of zstd.
+    pub fn push_all<T: Sync>(
+        &mut self,
+        items: &[T],
+        record: impl Fn(&T) -> R + Sync,
+        working: impl Fn(&T) -> WorkingWords,
+    ) -> std::io::Result<Vec<Cut<R>>> {
+        let (segment, mut cuts) = (segment::<R>(), Vec::new());
+        let to_next = (segment - self.count() as usize % segment) % segment;
+        let (mut now, mut later) = items.split_at(items.len().min(to_next));
+        loop {
+            for item in now {
+                cuts.extend(self.push(record(item), |_| working(item))?);
+            }
+            (now, later) = match self {
+                Self::Chunks(packer) if later.len() >= 2 * segment && spare_threads() > 1 => {
+                    let whole = later.chunks_exact(segment);
+                    let rest = whole.remainder();
+                    for chunk in pack_segments(packer, whole, &record)? {
+                        cuts.push(packer.adopt(chunk).into());
+                    }
+                    **packer = packer.next()?;
+                    (rest, &[])
+                }
+                _ if later.is_empty() => return Ok(cuts),
+                _ => (later, &[]),
+            };
+        }
     }
 
     /// Cuts the remaining records, one chunk or page at a time. Errors: those of zstd.
@@ -126,6 +181,28 @@ impl<R: PageRecord> Cutter<R> {
             Self::Pages(packer) => packer.pages(),
         }
     }
+}
+
+/// Packs segments behind what was packed, side by side; the chunks have no numbers yet. Errors: those of zstd.
+fn pack_segments<R: ChunkRecord, T: Sync>(
+    packer: &Packer<R>,
+    segments: std::slice::ChunksExact<T>,
+    record: impl Fn(&T) -> R + Sync,
+) -> std::io::Result<Vec<PackedChunk<R>>> {
+    let segments: Vec<(usize, &[T])> = segments.enumerate().collect();
+    let pack = |&(k, items): &(usize, &[T])| {
+        let (mut packer, mut chunks) = (packer.beyond(k * segment::<R>())?, Vec::new());
+        for item in items {
+            chunks.extend(packer.push(record(item))?);
+        }
+        while let Some(chunk) = packer.cut()? {
+            chunks.push(chunk);
+        }
+        Ok::<_, std::io::Error>(chunks)
+    };
+    let packed: Vec<_> = parallel(|| segments.par_iter().map(pack).collect());
+    let packed: Result<Vec<_>, _> = packed.into_iter().collect();
+    Ok(packed?.into_iter().flatten().collect())
 }
 
 /// Reads page number `address.chunk`.
@@ -204,4 +281,55 @@ fn read_page<R: PageRecord>(
         }
     }
     frames.records(page, records).map_err(|e| damaged(file, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tetdb_base::storage::{CancelToken, RunContext};
+    use tetdb_schema::page::NONE;
+    use tetdb_schema::record::SealedTet;
+    use tetdb_schema::unsealed::TetLinks;
+
+    type Values = Vec<(u64, Vec<u8>)>;
+
+    /// Cuts tetrahedra given some at a time.
+    fn values(n_tets: u32, at_once: usize, n_threads: usize) -> std::io::Result<Values> {
+        let tets: Vec<_> = (0..n_tets)
+            .map(|t| SealedTet {
+                nodes: [t / 6, t / 6 + t % 5 + 1, t / 5 + 9, t / 4 + 20],
+                region: t >> 16,
+            })
+            .collect();
+        let links = TetLinks { neighbors: [NONE; 4], required: 0, flags: 0 };
+        let run = RunContext::new(n_threads, CancelToken::new());
+        run.enter(|| {
+            let (mut cutter, mut cuts) = (Cutter::new(Form::Packed, 3, 1)?, Vec::new());
+            for some in tets.chunks(at_once) {
+                cuts.extend(cutter.push_all(some, |&tet| tet, |tet| tet.to_working(&links))?);
+            }
+            while let Some(cut) = cutter.cut()? {
+                cuts.push(cut);
+            }
+            let records: Vec<_> = cuts.iter().flat_map(|cut| cut.records.iter().copied()).collect();
+            assert!(records == tets && cutter.count() == u64::from(n_tets));
+            assert_eq!(cutter.chunks() as usize, cuts.len());
+            Ok(cuts.into_iter().flat_map(|cut| cut.values).collect())
+        })
+    }
+
+    #[test]
+    fn chunks_depend_neither_on_threads_nor_on_what_comes_at_once() -> std::io::Result<()> {
+        let n_tets = 2 * segment::<SealedTet>() as u32 + 70_000;
+        let expected = values(n_tets, 50_000, 1)?;
+        for (at_once, n_threads) in [(n_tets as usize, 4), (n_tets as usize, 1), (300_000, 4)] {
+            assert!(
+                values(n_tets, at_once, n_threads)? == expected,
+                "{at_once}, {n_threads} threads"
+            );
+        }
+        let whole = values(2 * segment::<SealedTet>() as u32, 600_000, 2)?;
+        assert!(expected.starts_with(&whole), "a mesh that ends where a segment ends");
+        Ok(())
+    }
 }

@@ -14,7 +14,7 @@ use tetdb_schema::unsealed::TetLinks;
 
 use super::SealedError;
 use super::batch::{Batch, cache_bytes};
-use super::form::{Cut, Cutter};
+use super::form::{Cut, Cutter, segment};
 use super::totals::{ChunkSums, SubdomainTotals, SumScratch, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use tetdb_base::geom::{Aabb, Point};
@@ -33,7 +33,7 @@ pub struct Sealed {
     pub interfaces: Vec<InterfaceSide>,
 }
 
-/// Tetrahedra taken at once, at most: some chunks, 6 MB.
+/// Tetrahedra taken at once by one thread, at most: some chunks, 6 MB.
 const TETS_AT_ONCE: usize = 4 * SealedTet::COUNT_MAX;
 /// Least memory with which chunks are summed up side by side: each has a table of 4 MB.
 const PARALLEL_BYTES: usize = 64 << 20;
@@ -128,13 +128,17 @@ impl SealedWriter {
     ///
     /// Errors: the disk.
     pub fn push_vertex(&mut self, vertex: SealedVertex) -> Result<(), SealedError> {
+        self.push_vertices(&[vertex])
+    }
+
+    /// Adds vertices; many at once are packed on all free threads.
+    ///
+    /// Errors: the disk.
+    pub fn push_vertices(&mut self, vertices: &[SealedVertex]) -> Result<(), SealedError> {
         assert!(self.cache.is_none(), "vertices come before tetrahedra");
         let rank = self.subdomain.rank();
-        let cut = self.vertices.push(vertex, |v| v.to_working(rank));
-        if let Some(chunk) = cut.map_err(self.io())? {
-            self.put_vertices(chunk)?;
-        }
-        Ok(())
+        let cuts = self.vertices.push_all(vertices, |&v| v, |v| v.to_working(rank));
+        self.put_vertices(cuts.map_err(self.io())?)
     }
 
     fn io(&self) -> impl Fn(std::io::Error) -> SealedError + use<> {
@@ -142,18 +146,28 @@ impl SealedWriter {
         move |e| SealedError::io(&path, e)
     }
 
-    fn put_vertices(&mut self, chunk: Cut<SealedVertex>) -> Result<(), SealedError> {
-        let points = chunk.records.iter().map(|v| Point::from_array(v.point));
-        let bounds = Aabb::around(points);
-        self.totals.bounds = self.totals.bounds.with(bounds.low).with(bounds.high);
-        let (bounds, points) = (array(&bounds), chunk.records.iter().map(|v| v.point));
-        self.vertex_chunks.push(VertexSummary {
-            cells: VertexSummary::cells_of(&bounds, points),
-            bounds,
-            first: chunk.first,
-            count: chunk.records.len() as u32,
-        });
-        self.put(chunk.values)
+    fn put_vertices(&mut self, cuts: Vec<Cut<SealedVertex>>) -> Result<(), SealedError> {
+        let summary = |cut: &Cut<SealedVertex>| {
+            let bounds =
+                array(&Aabb::around(cut.records.iter().map(|v| Point::from_array(v.point))));
+            VertexSummary {
+                cells: VertexSummary::cells_of(&bounds, cut.records.iter().map(|v| v.point)),
+                bounds,
+                first: cut.first,
+                count: cut.records.len() as u32,
+            }
+        };
+        let summaries: Vec<_> = match cuts.len() {
+            0 | 1 => cuts.iter().map(summary).collect(),
+            _ => parallel(|| cuts.par_iter().map(summary).collect()),
+        };
+        for (cut, summary) in cuts.into_iter().zip(summaries) {
+            let [low, high] = summary.bounds.map(Point::from_array);
+            self.totals.bounds = self.totals.bounds.with(low).with(high);
+            self.vertex_chunks.push(summary);
+            self.put(cut.values)?;
+        }
+        Ok(())
     }
 
     /// Ends the stream of vertices, so that they can be read.
@@ -161,8 +175,8 @@ impl SealedWriter {
         if self.cache.is_some() {
             return Ok(());
         }
-        while let Some(chunk) = self.vertices.cut().map_err(self.io())? {
-            self.put_vertices(chunk)?;
+        while let Some(cut) = self.vertices.cut().map_err(self.io())? {
+            self.put_vertices(vec![cut])?;
         }
         self.batch.flush(&mut self.file)?;
         let firsts = self.vertex_chunks.iter().map(|s| s.first).collect();
@@ -205,8 +219,8 @@ impl SealedWriter {
         self.end_vertices()?;
         let (io, rank) = (self.io(), self.subdomain.rank());
         let (taken, before) = (std::mem::take(&mut self.taken), std::mem::take(&mut self.packed));
+        let at_once = self.tets_at_once(taken.len());
         let (cutter, pairs) = (&mut self.tets, &mut self.pairs);
-        let at_once = (self.memory_bytes / 8 / TET_BYTES).clamp(1 << 12, TETS_AT_ONCE);
         let take = || {
             let mut taken = Vec::with_capacity(at_once);
             for tet in tets.take(at_once) {
@@ -214,14 +228,8 @@ impl SealedWriter {
             }
             Ok::<_, E>(taken)
         };
-        let pack = || {
-            let mut packed = Vec::new();
-            for (tet, place) in taken {
-                debug_assert_eq!(tet, tet.rotated());
-                packed.extend(cutter.push(tet, |tet| tet.to_working(&place))?);
-            }
-            Ok::<_, std::io::Error>(packed)
-        };
+        let pack =
+            || cutter.push_all(&taken, |&(tet, _)| tet, |(tet, place)| tet.to_working(place));
         let cache = self.cache.as_mut().expect("vertices have ended");
         let has_room = self.memory_bytes >= PARALLEL_BYTES;
         let (file, scratch, known) = (&mut self.file, &mut self.scratch, self.totals.cosines);
@@ -253,6 +261,15 @@ impl SealedWriter {
         Ok(())
     }
 
+    /// Tetrahedra to take while so many are packed: with memory and threads some segments, up to the end of one.
+    fn tets_at_once(&self, n_packing: usize) -> usize {
+        let (room, segment) = (self.memory_bytes / 8 / TET_BYTES, segment::<SealedTet>());
+        match (room / segment).min(spare_threads()) {
+            0 | 1 => room.clamp(1 << 12, TETS_AT_ONCE),
+            n => n * segment - (self.tets.count() as usize + n_packing) % segment,
+        }
+    }
+
     fn put(&mut self, values: Vec<(u64, Vec<u8>)>) -> Result<(), SealedError> {
         for (key, value) in values {
             self.batch.push(&mut self.file, key, value)?;
@@ -264,8 +281,8 @@ impl SealedWriter {
     ///
     /// Errors: the disk.
     pub fn push_facet(&mut self, facet: SealedFacet) -> Result<(), SealedError> {
-        let cut = self.facets.push(facet, SealedFacet::to_working);
-        if let Some(chunk) = cut.map_err(self.io())? {
+        let cuts = self.facets.push(facet, SealedFacet::to_working);
+        for chunk in cuts.map_err(self.io())? {
             self.facet_chunks.push(summary(&chunk));
             self.put(chunk.values)?;
         }
@@ -283,8 +300,8 @@ impl SealedWriter {
         side.0 += 1;
         side.1.add_face(corners.map(|c| c.mix), face.cut);
         let rank = self.subdomain.rank();
-        let cut = self.faces.push(face, |face| face.to_working(rank));
-        if let Some(chunk) = cut.map_err(self.io())? {
+        let cuts = self.faces.push(face, |face| face.to_working(rank));
+        for chunk in cuts.map_err(self.io())? {
             self.face_chunks.push(summary(&chunk));
             self.put(chunk.values)?;
         }

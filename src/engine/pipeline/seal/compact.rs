@@ -17,7 +17,7 @@ use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::geom::HilbertFrame;
 use tetdb_base::storage::{
-    KeyedId, Pages, SortRecord, Sorted, Sorter, StorageError, check_cancelled, kind,
+    KeyedId, Pages, SortRecord, Sorted, Sorter, StorageError, check_cancelled, kind, spare_threads,
 };
 use tetdb_kernel::mesh::anatomy::FACES;
 use tetdb_kernel::mesh::{Mesh, Scan, VertexTag, dense, scan_parts, sparse, tets_of_page};
@@ -71,8 +71,14 @@ fn vertices<P: Pages>(
         }
     }
     let (mut order, mut local) = (sorter.finish()?, 0);
+    // With memory for it each thread has a batch to pack.
+    let batch_bytes = (IDS * BATCH * size_of::<SealedVertex>()) as u64;
+    let n_batches = (target.memory / 16 / batch_bytes).clamp(1, spare_threads() as u64) as usize;
     loop {
-        let ids = order.by_ref().take(IDS * BATCH).map(|record| Ok::<_, StorageError>(record?.id));
+        let ids = order
+            .by_ref()
+            .take(IDS * BATCH * n_batches)
+            .map(|record| Ok::<_, StorageError>(record?.id));
         let ids: Vec<u32> = ids.collect::<Result<_, _>>()?;
         if ids.is_empty() {
             return Ok(());
@@ -80,11 +86,7 @@ fn vertices<P: Pages>(
         report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
         let scan = Vertices { ids: &ids, first: local, subdomain: target.subdomain };
         let parts: Vec<u32> = (0..ids.len().div_ceil(IDS) as u32).collect();
-        for vertices in scan_parts(mesh, &parts, &scan) {
-            for vertex in vertices {
-                writer.push_vertex(vertex)?;
-            }
-        }
+        writer.push_vertices(&scan_parts(mesh, &parts, &scan).concat())?;
         for v in ids {
             mesh.set_scratch(dense(v), local);
             local += 1;
