@@ -56,8 +56,8 @@ pub use parallel_sort::sort_unstable_by;
 pub use remote::RemoteFailure;
 pub use reserve::{filled, push, reserve};
 pub use run_context::{
-    CaughtPanic, RunContext, for_each_mut, in_place_scope, join, map_into, n_threads, parallel,
-    spare_threads,
+    CaughtPanic, RunContext, for_each_mut, in_place_scope, join, map_into, map_long, n_threads,
+    parallel, spare_threads,
 };
 pub use shelf::{Shelf, Shelved};
 pub use sort::{Sorted, Sorter};

@@ -198,6 +198,14 @@ pub fn map_into<T: Sync, U: Send>(
     }
 }
 
+/// The results of `found` for items that take long each, in order; in parallel if a thread is free.
+pub fn map_long<T: Sync, U: Send>(items: &[T], found: impl Fn(&T) -> U + Sync + Send) -> Vec<U> {
+    if items.len() < 2 || spare_threads() == 1 {
+        return items.iter().map(found).collect();
+    }
+    parallel(|| items.par_iter().map(found).collect())
+}
+
 /// A scope whose tasks go to the pool of this run; `work` itself stays on this thread.
 pub fn in_place_scope<'scope, T>(work: impl FnOnce(&Scope<'scope>) -> T) -> T {
     let pool = RunContext::current().and_then(|context| context.pool);

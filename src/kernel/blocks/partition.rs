@@ -5,8 +5,8 @@
 //! regions, which are own bricks and margin, share a brick.
 
 use super::load::Sample;
-use tetdb_base::geom::{Aabb, Point};
-use tetdb_base::storage::{StorageError, raise};
+use tetdb_base::geom::{Aabb, Point, mix};
+use tetdb_base::storage::{StorageError, map_long, raise};
 
 /// Tetrahedra of a block when it is finished.
 const BLOCK_TETS: f64 = 32_000.0;
@@ -22,6 +22,8 @@ const BRICK_TETS_MIN: f64 = 250.0;
 pub(super) const MARGINS: [f64; 2] = [3.0, 2.0];
 /// Bricks listed in all regions at most: a hundred times as many as usual.
 const LISTED_MAX: usize = 1 << 26;
+/// Blocks whose regions are found before their bricks are counted.
+const REGIONS_AT_ONCE: usize = 128;
 /// The use of memory in the error for regions that overlap everywhere.
 pub(super) const TOO_STEEP: &str =
     "a part of the mesh where wanted lengths change steeply, with its surroundings,";
@@ -99,15 +101,19 @@ impl KdPartition {
         partition.find_boxes(partition.root);
         let mut n_listed = 0;
         for (kind, margin) in MARGINS.into_iter().enumerate() {
-            for id in 0..partition.blocks.len() {
-                let block = &partition.blocks[id];
-                let region = partition.around(&block.bounds, |b| block.bricks.contains(&b), margin);
-                n_listed += region.len();
+            for from in (0..partition.blocks.len()).step_by(REGIONS_AT_ONCE) {
+                let some: Vec<_> = partition.blocks[from..].iter().take(REGIONS_AT_ONCE).collect();
+                let regions = map_long(&some, |block| {
+                    partition.around(&block.bounds, |b| block.bricks.contains(&b), margin)
+                });
+                for (block, region) in partition.blocks[from..].iter_mut().zip(regions) {
+                    n_listed += region.len();
+                    block.regions[kind] = region;
+                }
                 if n_listed > LISTED_MAX {
                     let [needed, available] = [n_listed, LISTED_MAX].map(|n| 4 * n as u64);
                     raise(StorageError::Budget { what: TOO_STEEP, needed, available });
                 }
-                partition.blocks[id].regions[kind] = region;
             }
             partition.find_conflicts(kind);
         }
@@ -262,16 +268,21 @@ impl KdPartition {
                 blocks_of[brick as usize].push(id);
             }
         }
-        let mut seen_by = vec![u32::MAX; self.blocks.len()];
-        for (id, block) in (0u32..).zip(&mut self.blocks) {
-            seen_by[id as usize] = id;
-            let others = block.regions[kind].iter().flat_map(|&b| &blocks_of[b as usize]);
-            let mut conflicts: Vec<u32> = others
+        let blocks: Vec<u32> = (0..self.blocks.len() as u32).collect();
+        let conflicts = map_long(&blocks, |&id| {
+            let mut is_seen = vec![false; self.blocks.len()];
+            is_seen[id as usize] = true;
+            let bricks = self.blocks[id as usize].regions[kind].iter();
+            let mut others: Vec<u32> = bricks
+                .flat_map(|&b| &blocks_of[b as usize])
                 .copied()
-                .filter(|&other| std::mem::replace(&mut seen_by[other as usize], id) != id)
+                .filter(|&b| !std::mem::replace(&mut is_seen[b as usize], true))
                 .collect();
-            conflicts.sort_unstable();
-            conflicts.shrink_to_fit();
+            others.sort_unstable();
+            others.shrink_to_fit();
+            others
+        });
+        for (block, conflicts) in self.blocks.iter_mut().zip(conflicts) {
             block.conflicts[kind] = conflicts;
         }
     }
@@ -282,12 +293,19 @@ impl KdPartition {
         let mean = self.blocks.iter().map(|b| b.load).sum::<f64>() / n as f64;
         // Part of a task's time does not depend on its load.
         let times: Vec<f64> = self.blocks.iter().map(|b| 0.3 * b.load + 0.7 * mean).collect();
-        let mut best = (f64::INFINITY, Vec::new());
         let mut random = 12_345u64;
-        for turn in 0..ORDERS {
+        let turns: Vec<(usize, u64)> = (0..ORDERS)
+            .map(|turn| {
+                let start = random;
+                (0..n).for_each(|_| random = mix(random + 1));
+                (turn, start)
+            })
+            .collect();
+        let colors = |&(turn, start): &(usize, u64)| {
+            let mut random = start;
             let mut keyed: Vec<_> = (0..n)
                 .map(|b| {
-                    random = tetdb_base::geom::mix(random + 1);
+                    random = mix(random + 1);
                     let degree = self.blocks[b].conflicts[0].len();
                     // Every other order takes blocks with many conflicts first.
                     let first = if turn % 2 == 0 { usize::MAX - degree / 4 } else { 0 };
@@ -295,13 +313,12 @@ impl KdPartition {
                 })
                 .collect();
             keyed.sort_unstable();
-            let colors = self.greedy(keyed.into_iter().map(|k| k.2));
-            let chain = self.longest_chain(&colors, &times);
-            if chain < best.0 {
-                best = (chain, colors);
-            }
-        }
-        for (block, color) in self.blocks.iter_mut().zip(best.1) {
+            self.greedy(keyed.into_iter().map(|k| k.2))
+        };
+        let chains = map_long(&turns, |turn| self.longest_chain(&colors(turn), &times));
+        let best = turns.iter().zip(chains).min_by(|a, b| a.1.total_cmp(&b.1));
+        let best = colors(best.expect("several orders").0);
+        for (block, color) in self.blocks.iter_mut().zip(best) {
             block.color = color;
         }
     }

@@ -2,13 +2,12 @@
 //!
 //! Both hold the same records in the same order under the same numbers, and readers return the same.
 
-use rayon::prelude::*;
 use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, PackedChunk, Packer};
 use tetdb_schema::page::PageError;
 use tetdb_schema::unsealed::{PageDecoder, PagePacker, PageRecord, PageSet, WorkingWords};
 
 use super::SealedError;
-use tetdb_base::storage::{StorageError, StoreFile, parallel, spare_threads};
+use tetdb_base::storage::{StorageError, StoreFile, map_long, spare_threads};
 use tetdb_schema::catalog::SubdomainState;
 use tetdb_schema::word::Word;
 
@@ -200,8 +199,7 @@ fn pack_segments<R: ChunkRecord, T: Sync>(
         }
         Ok::<_, std::io::Error>(chunks)
     };
-    let packed: Vec<_> = parallel(|| segments.par_iter().map(pack).collect());
-    let packed: Result<Vec<_>, _> = packed.into_iter().collect();
+    let packed: Result<Vec<_>, _> = map_long(&segments, pack).into_iter().collect();
     Ok(packed?.into_iter().flatten().collect())
 }
 

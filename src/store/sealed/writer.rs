@@ -18,7 +18,7 @@ use super::form::{Cut, Cutter, segment};
 use super::totals::{ChunkSums, SubdomainTotals, SumScratch, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use tetdb_base::geom::{Aabb, Point};
-use tetdb_base::storage::{DiskPath, StoreFile, join, parallel, spare_threads};
+use tetdb_base::storage::{DiskPath, StoreFile, join, map_long, parallel, spare_threads};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::totals::{InterfaceSide, RegionTotals};
 
@@ -157,10 +157,7 @@ impl SealedWriter {
                 count: cut.records.len() as u32,
             }
         };
-        let summaries: Vec<_> = match cuts.len() {
-            0 | 1 => cuts.iter().map(summary).collect(),
-            _ => parallel(|| cuts.par_iter().map(summary).collect()),
-        };
+        let summaries = map_long(&cuts, summary);
         for (cut, summary) in cuts.into_iter().zip(summaries) {
             let [low, high] = summary.bounds.map(Point::from_array);
             self.totals.bounds = self.totals.bounds.with(low).with(high);
