@@ -123,6 +123,6 @@ fn print_diff(diff: &VersionDiff, console: &Console) {
     console.line(&format!("{} the same", count(n_same, "sub-domain")));
     if diff.subdomains.iter().any(|part| part.changed) {
         console.line("the changed sub-domains:");
-        compare::print(&diff.changed.first, &diff.changed.second, console);
+        compare::print(&diff.qualities.first, &diff.qualities.second, console);
     }
 }

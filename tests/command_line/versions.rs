@@ -77,10 +77,10 @@ fn every_command_that_reads_reads_a_version() {
         .filter_map(|part| part["changed"].as_bool())
         .collect();
     assert_eq!(changed, [false, true]);
-    assert_eq!(diff["changed"]["first"]["all"]["tets"], diff["subdomains"][1]["tets"][0]);
+    assert_eq!(diff["qualities"]["first"]["all"]["tets"], diff["subdomains"][1]["tets"][0]);
     place.run_line("version a.tetdb diff base base").succeeds();
     place.run_line("resaturate a.tetdb --subdomain 0 --refine-by 0.8 --no-verify").succeeds();
-    let whole = place.run_line("version a.tetdb diff base now --json").json()["changed"].clone();
+    let whole = place.run_line("version a.tetdb diff base now --json").json()["qualities"].clone();
     let compared = place.run_line("compare a.tetdb a.tetdb --at-version base --json").json();
     for key in ["first", "second", "digests", "same"] {
         assert_eq!(whole[key], compared[key], "{key}");

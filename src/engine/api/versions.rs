@@ -61,7 +61,7 @@ pub struct VersionDiff {
     /// Fields of the second version alone, or with other values there.
     pub fields_after: Vec<String>,
     /// Qualities of the changed sub-domains; [`Comparison::same`] is true without any.
-    pub changed: Comparison,
+    pub qualities: Comparison,
 }
 
 /// A sub-domain in two versions. Pairs have the value of the first version first.
@@ -200,7 +200,7 @@ impl Store {
                 subdomains: subdomains.collect(),
                 fields_before: names(&fields_a, &fields_b),
                 fields_after: names(&fields_b, &fields_a),
-                changed: Comparison::of_rows([(&a, &changed_a), (&b, &changed_b)], settings)?,
+                qualities: Comparison::of_rows([(&a, &changed_a), (&b, &changed_b)], settings)?,
             })
         })
     }

@@ -36,6 +36,9 @@ pub struct JobWords<'py> {
 pub struct SettingWords {
     pub memory: Option<u64>,
     pub threads: Option<usize>,
+    /// The version of stores to read.
+    #[pyo3(default)]
+    pub version: Option<String>,
 }
 
 impl SettingWords {
@@ -46,6 +49,9 @@ impl SettingWords {
         }
         if let Some(n) = self.threads {
             settings = settings.threads(n);
+        }
+        if let Some(name) = self.version {
+            settings = settings.at_version(name);
         }
         match board {
             Some(board) => settings.progress(board.listener()),
