@@ -166,15 +166,12 @@ impl Catalog {
 
     /// Keeps what versions name, and drops what only versions named that the step replaces or removes.
     pub(super) fn settle(&mut self, step: &mut Step) -> Result<(), StoreError> {
-        let before = self.versions()?;
-        let mut after = before.clone();
-        let mut gone = Vec::new();
-        for (number, version) in &step.versions {
-            gone.extend(before.get(number));
-            match version {
-                Some(version) => drop(after.insert(*number, version.clone())),
-                None => drop(after.remove(number)),
-            }
+        let (mut after, mut gone) = (self.versions()?, Vec::new());
+        for (&number, version) in &step.versions {
+            gone.extend(match version {
+                Some(version) => after.insert(number, version.clone()),
+                None => after.remove(&number),
+            });
         }
         let after = || after.values();
         let meshes: BTreeSet<FileRow> = after().flat_map(|v| v.meshes.iter().copied()).collect();

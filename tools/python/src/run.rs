@@ -37,7 +37,6 @@ pub struct SettingWords {
     pub memory: Option<u64>,
     pub threads: Option<usize>,
     /// The version of stores to read.
-    #[pyo3(default)]
     pub version: Option<String>,
 }
 

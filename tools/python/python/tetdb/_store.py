@@ -235,7 +235,7 @@ class Store:
     ) -> None:
         self.path = path
         self._how: dict[str, Any] = {"memory": memory, "threads": threads, "version": version}
-        self._settings = {**_options.settings(memory, threads), "version": version}
+        self._settings = _options.settings(memory, threads, version)
         self._handle = (os.getpid(), _native.Store(path, self._settings))
         self._summary: dict[str, Any] | None = None
         self._lock = threading.Lock()
