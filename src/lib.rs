@@ -13,12 +13,12 @@ pub use tetdb_engine::api::{
     Population, Prediction, Qualities, Query, RegionInfo, Regions, Remesh, RemeshForecast,
     Remeshed, RepairKind, RepairReport, RepairStep, Reported, ResolveReport, Resolved,
     SAMPLE_PREFIX, Scalar, Seal, Seed, SeedKind, Settings, Share, ShownTriangles, SizeWarning,
-    Sizes, Snapped, Snapshot, SplitReport, StageInfo, Store, StoreInfo, SubdomainInfo, Subdomains,
-    Suggestion, Summary, Surface, SurfaceRemesh, SurfaceRemeshReport, SurfaceReport, SurfaceWrap,
-    SurfaceWritten, TaskReport, TaskStage, TaskStatus, Tasks, TetId, TransferMethod,
-    TransferredField, VARIABLES, Verification, VerifyLevel, VertexId, WELD_SHARE_MAX, Word,
-    WorkersPrediction, WrapReport, Writers, check_target, csv_head, inputs_of, peak_bytes, short,
-    task_ranges, typed,
+    Sizes, Snapped, Snapshot, SplitReport, StageInfo, Store, StoreInfo, SubdomainDiff,
+    SubdomainInfo, Subdomains, Suggestion, Summary, Surface, SurfaceRemesh, SurfaceRemeshReport,
+    SurfaceReport, SurfaceWrap, SurfaceWritten, TaskReport, TaskStage, TaskStatus, Tasks, TetId,
+    TransferMethod, TransferredField, VARIABLES, Verification, VerifyLevel, Version, VersionDiff,
+    VertexId, WELD_SHARE_MAX, Word, WorkersPrediction, WrapReport, Writers, check_target, csv_head,
+    inputs_of, peak_bytes, short, task_ranges, typed,
 };
 
 #[cfg(feature = "mpi")]

@@ -8,7 +8,8 @@ const INDEX_BITS: u32 = 20;
 
 /// A blob of the catalog, and what its bytes are.
 ///
-/// The three `Previous` blobs are those of the same names as they were before the last change of the sub-domain.
+/// The three `Previous` blobs are those of the same names as they were before the last change of the sub-domain. They are read, and no
+/// longer written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Blob {

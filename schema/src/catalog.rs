@@ -302,6 +302,23 @@ pub struct NeighborRow {
     pub faces: u64,
 }
 
+/// A version of a finished store: its rows and files that a change can replace. Number 0, without a name, is what was before the last change.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, Default)]
+pub struct VersionRow {
+    /// Its name.
+    pub name: String,
+    /// A note of its user.
+    pub note: String,
+    /// When it was saved: seconds since 1970.
+    pub saved: u64,
+    /// The key of each row and the key of its copy, ascending.
+    pub rows: Vec<[u64; 2]>,
+    /// Files of sub-domains.
+    pub meshes: Vec<FileRow>,
+    /// Files of fields.
+    pub fields: Vec<FileRow>,
+}
+
 /// A finished step.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct JournalRow {

@@ -77,9 +77,10 @@ codes! {
     WireContact "wire-contact" 3 "an embedded edge or point meets a triangle or an edge elsewhere than in common vertices";
     WireTooNear "wire-too-near" 3 "an embedded edge or point is nearer to something else than can be meshed";
     BadField "bad-field" 3 "the name, type or values of a field do not fit the store";
+    BadVersion "bad-version" 3 "the name of a version is no name or is taken, or a version would be changed";
     BadMesh "bad-mesh" 3 "a mesh to import is not one of positive tetrahedra that share whole faces";
     NoSuchStore "no-such-store" 3 "there is no store at this path";
-    NoSuchPart "no-such-part" 3 "the store has no such tetrahedron, vertex, edge, label, region, sub-domain, interface or stage";
+    NoSuchPart "no-such-part" 3 "the store has no such tetrahedron, vertex, edge, label, region, sub-domain, interface, stage or version";
     Damaged "damaged" 4 "the store is not what was written";
     StoreRecipe "store-recipe" 8 "the store was begun by a version whose recipe gives another mesh";
     Busy "busy" 5 "another process writes the store";

@@ -3,6 +3,8 @@
 //! The content is an archived record, except for two kinds: the format row ([`FORMAT_MAGIC`] and the version as u16), and the
 //! pieces of blobs (see [`Blob`]).
 
+use std::ops::Range;
+
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use crate::archive::{Archivable, from_archive, to_archive};
@@ -42,7 +44,7 @@ pub enum RowKind {
     Blob = 74,
     /// [`CoarseRow`](crate::catalog::CoarseRow) (0, rank).
     Coarse = 75,
-    /// [`SubdomainRow`](crate::catalog::SubdomainRow) before the last change (0, rank).
+    /// [`SubdomainRow`](crate::catalog::SubdomainRow) before the last change (0, rank); read, no longer written.
     Previous = 76,
     /// [`StageRow`](crate::catalog::StageRow) (stage, cut).
     Stage = 77,
@@ -56,13 +58,17 @@ pub enum RowKind {
     Field = 81,
     /// [`FieldPart`](crate::field::FieldPart) (number of the field, rank).
     FieldPart = 82,
-    /// [`FieldPart`](crate::field::FieldPart) of a sub-domain before its last change (number of the field, rank).
+    /// [`FieldPart`](crate::field::FieldPart) of a sub-domain before its last change (number of the field, rank); read, no longer written.
     PreviousFieldPart = 83,
+    /// [`VersionRow`](crate::catalog::VersionRow) (0, number of the version).
+    Version = 84,
+    /// The content of a row of a version; the rest of the key is a number drawn from the content.
+    Copy = 85,
 }
 
 impl RowKind {
     /// All kinds, by number.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 22] = [
         Self::Format,
         Self::State,
         Self::Job,
@@ -83,6 +89,8 @@ impl RowKind {
         Self::Field,
         Self::FieldPart,
         Self::PreviousFieldPart,
+        Self::Version,
+        Self::Copy,
     ];
 
     /// The kind of a key; `None` for a key of no row.
@@ -95,10 +103,30 @@ impl RowKind {
         (self as u64) << 56 | (major as u64 & 0xff_ffff) << 32 | minor as u64
     }
 
+    /// Key of the first place for a copy of `content`; if another content is there, the next place is tried.
+    pub fn copy_key(content: &[u8]) -> u64 {
+        (Self::Copy as u64) << 56 | xxh3_64_with_seed(content, 0) >> 8
+    }
+
     /// All keys of the kind.
-    pub const fn keys(self) -> std::ops::Range<u64> {
+    pub const fn keys(self) -> Range<u64> {
         (self as u64) << 56..(self as u64 + 1) << 56
     }
+}
+
+/// Keys of the rows that a version has, ascending; see [`VersionRow`](crate::catalog::VersionRow).
+pub const VERSIONED: [Range<u64>; 6] = [
+    RowKind::State.keys(),
+    RowKind::Regions.keys(),
+    RowKind::Subdomain.keys(),
+    blob_key(Blob::Totals(0), 0)..blob_key(Blob::PreviousTotals(0), 0),
+    RowKind::Field.keys(),
+    RowKind::FieldPart.keys(),
+];
+
+/// Returns whether a version has the row with this key.
+pub fn is_versioned(key: u64) -> bool {
+    VERSIONED.iter().any(|keys| keys.contains(&key))
 }
 
 /// Key of a piece of a blob, from 0. The first piece that is missing ends the blob.

@@ -10,10 +10,11 @@ use super::words::{quality_range, worst};
 use tetdb_engine::api::{Comparison, Population, Qualities};
 
 /// Exit code if the meshes differ.
-const DIFFERENT: u8 = 7;
+pub const DIFFERENT: u8 = 7;
 
 pub fn run(args: &CompareArgs, console: &Console) -> Result<u8, Failure> {
-    let settings = console.settings(memory::requested(args.read.memory.as_deref())?, None);
+    let settings =
+        args.at.of(console.settings(memory::requested(args.read.memory.as_deref())?, None));
     let found = Comparison::of(&args.first, &args.second, &settings)?;
     if console.is_json() {
         let mut answer = json!(found);
@@ -30,7 +31,7 @@ pub fn run(args: &CompareArgs, console: &Console) -> Result<u8, Failure> {
     Ok(if found.same { 0 } else { DIFFERENT })
 }
 
-fn print(a: &Qualities, b: &Qualities, console: &Console) {
+pub fn print(a: &Qualities, b: &Qualities, console: &Console) {
     console.line(&format!(
         "{:<14} {:>14} {:>9} {:>14} {:>9} {:>9}",
         "", "first", "", "second", "", "change"

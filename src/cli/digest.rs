@@ -9,7 +9,7 @@ use super::memory;
 use tetdb_engine::api::Store;
 
 pub fn run(args: &StoreArgs, console: &Console) -> Result<u8, Failure> {
-    let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
+    let settings = args.at.of(console.settings(memory::requested(args.memory.as_deref())?, None));
     let store = Store::open_with(&args.store, settings)?;
     let (digest, interface_digest) = (&store.summary().digest, &store.summary().interface_digest);
     if console.is_json() {

@@ -66,7 +66,8 @@ fn write_share(
     console: &Console,
     is_first: bool,
 ) -> Result<Vec<Exported>, Failure> {
-    let settings = console.settings(memory::requested(args.read.memory.as_deref())?, None);
+    let settings =
+        args.at.of(console.settings(memory::requested(args.read.memory.as_deref())?, None));
     let options = options(args, &settings)?;
     let mut outs = Vec::new();
     for out in &args.out {

@@ -102,7 +102,7 @@ fn help_of(code: Code) -> &'static str {
         Code::Busy => "wait for the other process, or stop it",
         Code::DiskFull => "free some space, then `tetdb resume STORE`",
         Code::Damaged => {
-            "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` meshes damaged sub-domains again, `--forget` drops a damaged previous version"
+            "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` meshes damaged sub-domains again, `--forget` drops a damaged previous version, `tetdb version STORE drop NAME` one with a name"
         }
         Code::Memory => "give more with --memory, or take a coarser surface",
         Code::Stopped if super::signals::has_store() => {
@@ -158,7 +158,7 @@ fn help_of(code: Code) -> &'static str {
             "join what is meant to meet, or move it apart; --snap-embedded DIST moves points and ends that are nearer to a triangle onto it"
         }
         Code::NothingToUndo => {
-            "only the last `tetdb resaturate` can be undone, once, and not after --forget"
+            "only the last `tetdb resaturate` or `tetdb version STORE restore` can be undone, once, and not after --forget; `tetdb version STORE list` lists what has a name"
         }
         Code::CountMismatch => {
             "`tetdb export STORE part.npy --subdomain N` writes the arrays of a sub-domain in that order"

@@ -11,7 +11,7 @@ use super::memory;
 use super::tasks;
 use super::words::{self, count, quality_range, quoted, worst};
 use tetdb_engine::api::{
-    Excess, QualityRow, RegionInfo, Store, StoreInfo, StoreState, Tasks, short,
+    Excess, QualityRow, RegionInfo, Settings, Store, StoreInfo, StoreState, Tasks, short,
 };
 
 /// The recorded name of a surface that is kept in the store.
@@ -28,20 +28,20 @@ const SUBDOMAINS_LISTED: usize = 32;
 pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
     // The rows of a catalog take far less than the smallest cap.
     let memory = memory::requested(args.of.memory.as_deref())?;
+    let settings = args.of.at.of(console.settings(memory, None));
     let path = &args.of.store;
-    let excess = (args.excess)
-        .then(|| Store::open_with(path, console.settings(memory, None))?.excess())
-        .transpose()?;
+    let excess =
+        (args.excess).then(|| Store::open_with(path, settings.clone())?.excess()).transpose()?;
     console.done();
     if console.is_json() {
-        let mut all = object(path)?;
+        let mut all = object_at(path, &settings)?;
         if let Some(excess) = excess {
             all["excess"] = json!(excess);
         }
         console.answer(&all);
         return Ok(0);
     }
-    print(path, console)?;
+    print_at(path, &settings, console)?;
     if let Some(Excess { worst, above_two }) = excess {
         console.line(&format!(
             "excess (q over the least that the surface allows): {} at most; above 2: {}",
@@ -54,7 +54,11 @@ pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
 
 /// The whole record, for programs.
 pub fn object(path: &Path) -> Result<Value, Failure> {
-    let mut all = json!(StoreInfo::read(path)?);
+    object_at(path, &Settings::new())
+}
+
+fn object_at(path: &Path, settings: &Settings) -> Result<Value, Failure> {
+    let mut all = json!(StoreInfo::read_with(path, settings)?);
     all["schema"] = json!(1);
     all["tasks"] = json!(Tasks::of(path).status()?.as_ref().map(tasks::object));
     Ok(all)
@@ -67,7 +71,11 @@ pub fn hex(digest: [u64; 2]) -> String {
 
 /// Prints the record for people.
 pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
-    let info = StoreInfo::read(path)?;
+    print_at(path, &Settings::new(), console)
+}
+
+fn print_at(path: &Path, settings: &Settings, console: &Console) -> Result<(), Failure> {
+    let info = StoreInfo::read_with(path, settings)?;
     let surfaces = info.surfaces.iter().map(|s| match (s.path.as_str(), s.path.split_once(':')) {
         (COPY, _) => "a copy in the store of its surface".to_owned(),
         (_, Some(("resolved", what))) => format!("crossings resolved ({what})"),
@@ -139,6 +147,13 @@ fn print_bytes(info: &StoreInfo, console: &Console) {
             "previous version of {}, for `tetdb resaturate --undo`: {}",
             count(info.n_previous as u64, "sub-domain"),
             memory::show(info.previous_bytes)
+        ));
+    }
+    if !info.versions.is_empty() {
+        console.line(&format!(
+            "{}, of files that nothing else needs: {}",
+            count(info.versions.len() as u64, "version"),
+            memory::show(info.version_bytes)
         ));
     }
     if !console.is_verbose() {

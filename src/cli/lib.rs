@@ -39,6 +39,7 @@ mod tasks;
 mod threads;
 mod transfer;
 mod verify;
+mod version;
 mod words;
 mod wrap;
 
@@ -205,6 +206,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Query(args) => query::run(args, console),
         Command::Field(args) => field::run(args, console),
         Command::Transfer(args) => transfer::run(args, console),
+        Command::Version(args) => version::run(args, console),
         Command::Verify(args) => verify::run(args, console),
         Command::Compare(args) => compare::run(args, console),
         Command::Digest(args) => digest::run(args, console),
@@ -231,5 +233,6 @@ fn writes_files(command: &Command) -> bool {
             | Command::Query(_)
             | Command::Field(_)
             | Command::Transfer(_)
+            | Command::Version(_)
     )
 }

@@ -29,7 +29,7 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
         let inputs = inputs_of(&args.store).into_iter().chain(args.points.clone());
         check_target(out, &inputs.collect::<Vec<_>>())?;
     }
-    let settings = console.settings(memory::requested(args.memory.as_deref())?, None);
+    let settings = args.at.of(console.settings(memory::requested(args.memory.as_deref())?, None));
     let mut store = Store::open_with(&args.store, settings.clone())?;
     let columns = columns(args, &store)?;
     let order = order(args, &store)?;

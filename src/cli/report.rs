@@ -9,7 +9,8 @@ use super::memory;
 use tetdb_engine::api::Store;
 
 pub fn run(args: &ReportArgs, console: &Console) -> Result<u8, Failure> {
-    let settings = console.settings(memory::requested(args.read.memory.as_deref())?, None);
+    let settings =
+        args.at.of(console.settings(memory::requested(args.read.memory.as_deref())?, None));
     let reported = Store::open_with(&args.store, settings)?.report(&args.output)?;
     console.done();
     let file = args.output.display().to_string();

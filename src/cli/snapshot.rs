@@ -11,7 +11,8 @@ use tetdb_engine::api::{Code, ColorBy, Snapped, Snapshot, Store, Word};
 const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;
 
 pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
-    let settings = console.settings(memory::requested(args.read.memory.as_deref())?, None);
+    let settings =
+        args.at.of(console.settings(memory::requested(args.read.memory.as_deref())?, None));
     let store = Store::open_with(&args.store, settings)?;
     let snapshot = snapshot(args, &store).map_err(|error| match error.code {
         Code::BadQuery => error.help("`tetdb snapshot --help` has examples"),

@@ -13,7 +13,7 @@ use tetdb_engine::api::{Store, TransferredField, Word, short};
 pub fn run(args: &TransferArgs, console: &Console) -> Result<u8, Failure> {
     let cap = memory::requested(args.read.memory.as_deref())?;
     let settings = console.settings(cap, threads::requested(args.threads)?);
-    let from = Store::open_with(&args.from, settings.clone())?;
+    let from = Store::open_with(&args.from, args.at.of(settings.clone()))?;
     let names: Vec<&str> = args.field.iter().map(String::as_str).collect();
     let fields = Store::open_with(&args.to, settings)?.transfer_from(&from, &names, args.method)?;
     console.done();

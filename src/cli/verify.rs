@@ -49,7 +49,7 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     }
     found.accept(&args.store)?;
     console.line(&found.sentence());
-    if !store.summary().is_verified {
+    if !store.summary().is_verified && args.at.at_version.is_none() {
         console.note(&format!(
             "the record of the store is left as it is; `tetdb resume {}` verifies and records it",
             quoted(&args.store)
@@ -67,5 +67,5 @@ pub(super) fn settings(args: &VerifyArgs, console: &Console) -> Result<Settings,
     {
         settings = super::ranks::share_work(settings);
     }
-    Ok(settings)
+    Ok(args.at.of(settings))
 }

@@ -28,6 +28,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("invalid-mesh", "below"),
     ("contradicting-orientation", "walls.rs"),
     ("bad-field", "fields.rs"),
+    ("bad-version", "versions.rs"),
     ("bad-mesh", "import.rs"),
     ("bad-seed", "seeds.rs"),
     ("sheet-outside", "sheets.rs"),

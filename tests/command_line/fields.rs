@@ -93,8 +93,11 @@ fn values_are_the_same_whatever_they_come_from() {
     let line = "resaturate a.tetdb --subdomain 1 --refine-by 0.8 --drop-fields";
     place.run_line(line).succeeds();
     assert!(fields(&place, "a.tetdb").is_empty());
-    assert!(!place.names().iter().any(|name| name.starts_with("a.tetdb/field")));
     place.run_line("resaturate a.tetdb --undo").succeeds();
+    assert_eq!(fields(&place, "a.tetdb").len(), 7);
+    place.run_line(line).succeeds();
+    place.run_line("resaturate a.tetdb --forget").succeeds();
+    assert!(!place.names().iter().any(|name| name.starts_with("a.tetdb/field")));
 }
 
 #[test]

@@ -39,6 +39,7 @@ mod subdomains;
 mod tasks;
 mod together;
 mod transfer;
+mod versions;
 mod walls;
 mod wires;
 mod wrap;

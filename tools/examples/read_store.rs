@@ -17,7 +17,7 @@ use tetdb_schema::archive::Archivable;
 use tetdb_schema::blob::{Blob, BlobContent};
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
-    SubdomainRow, TopologyRow, WiresRow,
+    SubdomainRow, TopologyRow, VersionRow, WiresRow,
 };
 use tetdb_schema::chunk::{
     ChunkAddress, ChunkRecord, Decoder, RangeSummary, TetSummary, VertexSummary,
@@ -86,8 +86,10 @@ pub fn describe(store: &Path) -> Outcome<Vec<(String, String)>> {
     let mut finished: Vec<SubdomainRow> = rows(&catalog, RowKind::Subdomain)?;
     finished.extend(rows(&catalog, RowKind::Previous)?);
     finished.extend(rows::<StageRow>(&catalog, RowKind::Stage)?.into_iter().map(|s| s.row));
+    let versions: Vec<VersionRow> = rows(&catalog, RowKind::Version)?;
     for file in rows::<FileRow>(&catalog, RowKind::File)? {
-        let is_finished = finished.iter().any(|row| row.file() == file);
+        let is_finished = finished.iter().any(|row| row.file() == file)
+            || versions.iter().any(|version| version.meshes.contains(&file));
         all.extend(file_records(store, file, is_finished)?);
     }
     for row in rows::<CoarseRow>(&catalog, RowKind::Coarse)? {
@@ -156,6 +158,8 @@ fn row_text(kind: RowKind, key: u64, value: &[u8]) -> Result<String, String> {
         RowKind::Stage => text::<StageRow>(key, value),
         RowKind::Embedded => text::<WiresRow>(key, value),
         RowKind::LabelSets => text::<Vec<LabelSet>>(key, value),
+        RowKind::Version => text::<VersionRow>(key, value),
+        RowKind::Copy => Ok(format!("{} bytes of a row", checked_bytes(key, value)?.len())),
         _ => Err(format!("a row of kind {kind:?}")),
     }
 }

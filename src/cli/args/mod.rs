@@ -12,6 +12,7 @@ mod store;
 mod surface;
 mod tasks;
 mod transfer;
+mod version;
 mod words;
 
 use clap::{Parser, Subcommand};
@@ -31,6 +32,7 @@ pub use surface::{
 };
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 pub use transfer::TransferArgs;
+pub use version::{VersionAction, VersionArgs};
 
 /// Fills a closed triangle surface with tetrahedra.
 #[derive(Debug, Parser)]
@@ -106,6 +108,11 @@ pub enum Command {
     /// They are added to it under their names, in one step; Ctrl-C leaves it as it was. Outside of the old mesh, values are those of its
     /// nearest point.
     Transfer(TransferArgs),
+    /// Keep states of a store under names, compare them, bring them back
+    ///
+    /// A version has mesh and fields. Files never change, so it copies none: it keeps from removal what later changes replace. Commands that
+    /// read a store read a version with --at-version.
+    Version(VersionArgs),
     /// Prove that a store holds a valid mesh
     ///
     /// All tetrahedra positive by exact signs, each face paired or on the surface, each input triangle there, checksums and digest as they
@@ -171,6 +178,7 @@ impl Command {
             Self::Query(a) => a.json,
             Self::Field(a) => a.is_json(),
             Self::Transfer(a) => a.read.json,
+            Self::Version(a) => a.read().json,
             Self::Verify(a) => a.read.json,
             Self::Compare(a) => a.read.json,
             Self::Export(a) => a.read.json,

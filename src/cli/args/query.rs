@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use super::run::AtArgs;
+
 /// Tetrahedra by place, number, neighborhood or condition. All that is given must hold; nothing given means all.
 #[derive(Debug, Default, clap::Args)]
 #[command(
@@ -85,6 +87,8 @@ pub struct QueryArgs {
     /// Write the answers to this file: .csv, .jsonl, .npy or .vtu
     #[arg(short, long, value_name = "FILE", conflicts_with = "csv")]
     pub output: Option<PathBuf>,
+    #[command(flatten)]
+    pub at: AtArgs,
     /// Most memory to hold
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use tetdb_engine::api::Settings;
+
 /// How to read a store; none of this changes the answer.
 #[derive(Debug, clap::Args)]
 pub struct ReadArgs {
@@ -11,6 +13,24 @@ pub struct ReadArgs {
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+/// The version to read.
+#[derive(Debug, Default, clap::Args)]
+pub struct AtArgs {
+    /// Read the store as it was in this version; see `tetdb version --help`
+    #[arg(long, value_name = "NAME")]
+    pub at_version: Option<String>,
+}
+
+impl AtArgs {
+    /// Settings to read it.
+    pub fn of(&self, settings: Settings) -> Settings {
+        match &self.at_version {
+            Some(name) => settings.at_version(name),
+            None => settings,
+        }
+    }
 }
 
 /// How to run; none of this changes the mesh.

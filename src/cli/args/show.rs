@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::run::ReadArgs;
+use super::run::{AtArgs, ReadArgs};
 
 /// A cut through the mesh by a plane, seen from the side its direction points to; or surfaces in space. Reads only what is seen.
 #[derive(Debug, clap::Args)]
@@ -50,6 +50,8 @@ pub struct SnapshotArgs {
     #[arg(long, value_name = "WxH", default_value = "1600x1200")]
     pub size: String,
     #[command(flatten)]
+    pub at: AtArgs,
+    #[command(flatten)]
     pub read: ReadArgs,
 }
 
@@ -64,6 +66,8 @@ pub struct ReportArgs {
     /// The page to write: .html; one that is there is replaced
     #[arg(value_name = "OUT")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub at: AtArgs,
     #[command(flatten)]
     pub read: ReadArgs,
 }

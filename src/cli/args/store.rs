@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::run::ReadArgs;
+use super::run::{AtArgs, ReadArgs};
 use super::surface::{RepairArgs, SheetArgs};
 use tetdb_engine::api::Share;
 
@@ -11,6 +11,8 @@ pub struct StoreArgs {
     /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
+    #[command(flatten)]
+    pub at: AtArgs,
     /// Most memory to hold
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
@@ -50,6 +52,8 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub threads: Option<usize>,
     #[command(flatten)]
+    pub at: AtArgs,
+    #[command(flatten)]
     pub read: ReadArgs,
     /// The repair of the surface that --against names.
     #[command(flatten)]
@@ -65,12 +69,14 @@ pub struct VerifyArgs {
     after_help = "Example:\n  tetdb compare one.tetdb four.tetdb\n\nExit code 0: the same mesh, bit by bit; 7: another."
 )]
 pub struct CompareArgs {
-    /// A store
+    /// A store; --at-version names its version
     #[arg(value_name = "A")]
     pub first: PathBuf,
     /// The other one
     #[arg(value_name = "B")]
     pub second: PathBuf,
+    #[command(flatten)]
+    pub at: AtArgs,
     #[command(flatten)]
     pub read: ReadArgs,
 }
@@ -143,6 +149,8 @@ pub struct ExportArgs {
     /// Write even over the surface the store was meshed from
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub at: AtArgs,
     #[command(flatten)]
     pub read: ReadArgs,
 }

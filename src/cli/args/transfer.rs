@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::run::ReadArgs;
+use super::run::{AtArgs, ReadArgs};
 use super::words::word_of;
 use tetdb_engine::api::TransferMethod;
 
@@ -11,7 +11,7 @@ use tetdb_engine::api::TransferMethod;
     tetdb transfer old.tetdb new.tetdb --field temperature --field u --threads 4 --memory 1GiB\n  \
     tetdb transfer old.tetdb new.tetdb --field mark --method nearest")]
 pub struct TransferArgs {
-    /// The store that has the fields
+    /// The store that has the fields; --at-version names its version
     #[arg(value_name = "FROM")]
     pub from: PathBuf,
     /// The store on whose mesh they are evaluated, and that they are added to
@@ -27,6 +27,8 @@ pub struct TransferArgs {
     /// Threads to use [default: all cores]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub threads: Option<usize>,
+    #[command(flatten)]
+    pub at: AtArgs,
     #[command(flatten)]
     pub read: ReadArgs,
 }

@@ -225,10 +225,10 @@ pub(super) fn field_called(catalog: &mut Catalog, name: &str) -> Result<FieldRow
 /// Drops a field with all its values, in one step.
 fn drop_values(catalog: &mut Catalog, field: &FieldRow) -> Result<(), Error> {
     let clock = Instant::now();
-    let (parts, previous) = (catalog.field_parts()?, catalog.previous_field_parts()?);
+    let parts = catalog.field_parts()?;
     let state = catalog.state()?;
     Ok(catalog.commit(|step| {
-        step.remove_field(field, &parts, &previous);
+        step.remove_field(field, &parts);
         step.append_journal(&journal(state, "drop field", clock));
         Ok(())
     })?)

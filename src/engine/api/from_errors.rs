@@ -101,7 +101,7 @@ impl From<StoreError> for Error {
             StoreError::Busy { .. } => Code::Busy,
             StoreError::Changed { .. } => Code::StoreChanged,
             StoreError::NotFound { .. } => Code::NoSuchStore,
-            StoreError::NoSubdomain { .. } => Code::NoSuchPart,
+            StoreError::NoSubdomain { .. } | StoreError::NoVersion { .. } => Code::NoSuchPart,
             StoreError::NotOurs { .. } => Code::NotAStore,
             StoreError::Finished { .. } => Code::StoreExists,
             StoreError::Unfinished { .. } => Code::StoreUnfinished,
@@ -194,7 +194,7 @@ impl From<PipelineError> for Error {
                 .with_help("fill all regions, and look at the surface")
                 .with_remedy(Remedy::General),
             PipelineError::NothingToUndo { .. } => Self::new(Code::NothingToUndo, &e)
-                .with_help("only the last change can be undone, once, and not after its old version was dropped")
+                .with_help("only the last change can be undone, once, and not after its old version was dropped; versions with a name stay")
                 .with_remedy(Remedy::General),
             PipelineError::SheetOutside { ref at, .. } => Self::new(Code::SheetOutside, &e)
                 .at(show(*at))

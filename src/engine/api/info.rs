@@ -7,6 +7,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::fields::{Field, fields_of};
+use super::store::at_version;
+use super::versions::kept;
 use super::{Error, Settings, guarded};
 use crate::pipeline;
 use tetdb_base::geom::{Aabb, Point};
@@ -16,7 +18,7 @@ use tetdb_schema::catalog::{
 };
 use tetdb_schema::digest::Digest;
 use tetdb_schema::labels::LabelSet;
-use tetdb_store::store::Catalog;
+use tetdb_store::store::{BEFORE, Catalog};
 
 /// The record of a store.
 ///
@@ -56,8 +58,12 @@ pub struct StoreInfo {
     pub bytes: u64,
     /// Bytes of the coarse snapshots.
     pub coarse_bytes: u64,
-    /// Bytes of the previous versions that an undo restores.
+    /// Bytes that only the version before the last change needs, which an undo restores.
     pub previous_bytes: u64,
+    /// Names of the versions, the oldest first.
+    pub versions: Vec<String>,
+    /// Bytes of files that only versions need, besides `previous_bytes`.
+    pub version_bytes: u64,
     /// Fields, in the order in which they were added.
     pub fields: Vec<Field>,
     /// Bytes of the fields' files.
@@ -77,6 +83,9 @@ pub struct StoreInfo {
     /// Number of sub-domains with a previous version.
     #[serde(skip)]
     pub n_previous: usize,
+    /// Bytes of all files of sub-domains and fields.
+    #[serde(skip)]
+    file_bytes: u64,
 }
 
 /// A label of embedded edges and points.
@@ -160,15 +169,21 @@ impl StoreInfo {
     /// # Errors
     /// `no-such-store`, `not-a-store`, `store-format`, `busy`, `damaged`.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
-        guarded(&Settings::new(), || Self::of(path.as_ref()))
+        Self::read_with(path, &Settings::new())
     }
 
-    fn of(path: &Path) -> Result<Self, Error> {
-        let catalog = &mut Catalog::open(path)?;
+    /// Like [`StoreInfo::read`], at the version that the settings name. Errors: also `no-such-part`.
+    pub fn read_with(path: impl AsRef<Path>, settings: &Settings) -> Result<Self, Error> {
+        guarded(settings, || Self::of(path.as_ref(), settings))
+    }
+
+    fn of(path: &Path, settings: &Settings) -> Result<Self, Error> {
+        let mut catalog = Catalog::open(path)?;
+        let (kept, n_previous) = (kept(&mut catalog)?, pipeline::previous(&mut catalog)?.len());
+        let catalog = &mut at_version(catalog, settings)?;
         let (state, job) = (catalog.state()?, catalog.job()?);
         let rows = catalog.subdomains()?;
-        let (previous, fields) = (catalog.previous()?, fields_of(catalog)?);
-        let previous_values = catalog.previous_field_parts()?;
+        let fields = fields_of(catalog)?;
         let (coarse, subdomains) = (catalog.coarse_snapshots()?, subdomains(catalog, &rows)?);
         let stages = catalog.stages()?.into_iter();
         let all = (rows.iter()).map(|r| Aabb::around(r.bounds.map(Point::from_array)));
@@ -192,8 +207,10 @@ impl StoreInfo {
             bounds: [all.low, all.high].map(|p| p.to_array()),
             bytes: rows.iter().map(|r| r.bytes).sum(),
             coarse_bytes: coarse.iter().map(|c| c.bytes).sum(),
-            previous_bytes: previous.iter().map(|r| r.bytes).sum::<u64>()
-                + previous_values.iter().map(|part| part.bytes).sum::<u64>(),
+            previous_bytes: kept.alone.get(&BEFORE).copied().unwrap_or(0),
+            versions: kept.names,
+            version_bytes: kept.bytes - kept.alone.get(&BEFORE).copied().unwrap_or(0),
+            file_bytes: kept.all_bytes,
             field_bytes: fields.iter().map(|field| field.bytes).sum(),
             fields,
             catalog_bytes: catalog.file_bytes()?,
@@ -209,14 +226,13 @@ impl StoreInfo {
             subdomains,
             interfaces: catalog.interfaces()?,
             journal: catalog.journal()?,
-            n_previous: previous.len(),
+            n_previous,
         })
     }
 
     /// Total bytes of the store on disk.
     pub fn bytes_on_disk(&self) -> u64 {
-        let kept = self.previous_bytes + self.field_bytes;
-        self.bytes + self.coarse_bytes + kept + self.catalog_bytes
+        self.file_bytes + self.coarse_bytes + self.catalog_bytes
     }
 
     /// Qualities of all tetrahedra.

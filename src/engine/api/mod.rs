@@ -18,7 +18,7 @@
 //! | `ask`, `condition`, `answer_rows`, `answer_file` | questions and their answers |
 //! | `fields`, `field_spec`, `field_sources`, `transfer` | values kept with a finished mesh, and brought to another |
 //! | `import` | a mesh made by another program as a store |
-//! | `remesh`, `remesh_sizes` | meshing sub-domains again |
+//! | `remesh`, `remesh_sizes`, `versions` | meshing sub-domains again; versions of a store |
 //! | `tasks`, `tasks_status` | one mesh by the tasks of a batch scheduler |
 //! | `mpi` | one mesh by the ranks of an MPI program |
 //! | `show`, `picture`, `page`, `targets` | files for other programs, pictures, the page; protection of input files |
@@ -82,6 +82,7 @@ mod verify;
 #[cfg(any(test, feature = "mpi"))]
 mod verify_server;
 mod verify_shared;
+mod versions;
 
 pub use crate::pipeline::{MeshOptions, OptionsText};
 pub use crate::view::Excess;
@@ -155,3 +156,4 @@ pub use tetdb_store::audit::{Population, Qualities};
 pub use tetdb_store::transfer::TransferMethod;
 pub use transfer::TransferredField;
 pub use verify::{Verification, VerifyLevel};
+pub use versions::{SubdomainDiff, Version, VersionDiff};

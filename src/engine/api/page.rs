@@ -74,7 +74,7 @@ fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result<Reported, 
         return Err(error.with_help(format!("end the name with {}", page::ENDINGS)));
     }
     let cap = settings.cap()?;
-    let mut store = open_finished(path)?;
+    let mut store = open_finished(path, settings)?;
     let title = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut data = of_catalog(path, &mut store, &title)?;
     // The remaining memory is for text and tables of the page.
@@ -108,7 +108,7 @@ impl Store {
         let settings = self.settings();
         guarded(settings, || {
             let cap = settings.cap()?;
-            let open = open_finished(self.path())?;
+            let open = open_finished(self.path(), settings)?;
             let mut session = QuerySession::open(open, &Budget::new(cap / 2))?;
             let report = |done, total| settings.count("measure", done, total, "tetrahedra");
             Ok(view::statistics(&mut session, &Budget::new(cap / 8 * 3), &report)?.excess)

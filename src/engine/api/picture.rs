@@ -241,7 +241,7 @@ fn take(
     )?;
     // The session uses three quarters of the budget given to it.
     let share = Budget::new(budget.available() * 3 / 4);
-    let store = open_finished(path)?;
+    let store = open_finished(path, settings)?;
     let mut session = match snapshot.subject {
         Subject::Stage(cut, stage) => QuerySession::open_stage(store, cut, stage, &share)?,
         _ => QuerySession::open(store, &share)?,

@@ -14,7 +14,7 @@ use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Va
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::code::Code;
 use tetdb_store::audit::Level;
-use tetdb_store::store::{Catalog, StoreError, WriterLock};
+use tetdb_store::store::{BEFORE, Catalog, StoreError, WriterLock};
 
 /// A request to mesh sub-domains again; see [`Store::remesh`].
 ///
@@ -49,7 +49,7 @@ enum RemeshRanks {
     Changed,
 }
 
-/// Result of meshing sub-domains again, or of undoing it.
+/// Result of meshing sub-domains again, or of bringing back an older version.
 #[non_exhaustive]
 pub struct Remeshed {
     /// The store after the change.
@@ -86,19 +86,28 @@ impl Store {
         Remesh::new(path, settings)
     }
 
-    /// Restores the sub-domains that the last [`Store::remesh`] replaced, with the values of their fields. Errors: `nothing-to-undo`;
-    /// `bad-field` for a field that was added since.
+    /// Restores mesh and fields as they were before the last [`Store::remesh`] or [`Store::restore_version`]. Errors: `nothing-to-undo`;
+    /// `bad-field` for a field that was added since and is in no version.
     pub fn undo(self) -> Result<Self, Error> {
         Ok(self.undo_reported(false)?.store)
     }
 
     /// Like [`Store::undo`], with a report. Also verifies the mesh if `verify` is true. Errors: as [`Store::undo`]; `invalid-mesh`.
     pub fn undo_reported(self, verify: bool) -> Result<Remeshed, Error> {
+        self.restored(|_| Ok(BEFORE), verify)
+    }
+
+    /// Restores the version whose number `which` finds.
+    pub(super) fn restored(
+        self,
+        which: impl FnOnce(&mut Catalog) -> Result<u32, Error>,
+        verify: bool,
+    ) -> Result<Remeshed, Error> {
         let (path, settings) = self.into_parts();
         let summary = guarded(&settings, || {
             let mut catalog = open_to_change(&path, &settings)?;
-            let lock = catalog.lock();
-            let summary = pipeline::undo(&mut catalog)?;
+            let (lock, number) = (catalog.lock(), which(&mut catalog)?);
+            let summary = pipeline::restore(&mut catalog, number)?;
             catalog.close()?;
             if let (true, Some(lock)) = (verify, lock) {
                 verify_changed(&path, &settings, lock)?;
@@ -220,7 +229,7 @@ impl Remesh {
     /// Lists the sub-domains that [`Remesh::run`] would mesh again. Nothing is changed. Errors: as [`Remesh::run`].
     pub fn forecast(&self) -> Result<Vec<RemeshForecast>, Error> {
         guarded(&self.settings, || {
-            let mut open = open_finished(&self.path)?;
+            let mut open = open_finished(&self.path, &self.settings)?;
             let (options, request) = self.request(&mut open)?;
             if request.ranks.is_empty() {
                 return Ok(Vec::new());
@@ -338,7 +347,7 @@ fn verify_changed(
     lock: Arc<WriterLock>,
 ) -> Result<(), Error> {
     let report = {
-        let mut open = open_finished(path)?;
+        let mut open = open_finished(path, settings)?;
         let sources = open.job()?.surfaces;
         let cap = settings.cap()?;
         let scratch = scratch_beside(&tetdb_base::surface::Surface::default(), cap, path)?;

@@ -1,4 +1,4 @@
-//! Settings of a run: memory, threads, cancelling, progress. None of them changes the mesh.
+//! Settings of a run: memory, threads, cancelling, progress, the version to read. None of them changes the mesh.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -40,7 +40,7 @@ pub enum Event {
 
 type Listener = Arc<dyn Fn(&Event) + Send + Sync>;
 
-/// Settings of a run: memory, threads, cancelling, progress.
+/// Settings of a run: memory, threads, cancelling, progress, the version to read.
 ///
 /// None of them changes the mesh. Clones share the token and the listener.
 #[derive(Clone, Default)]
@@ -50,6 +50,7 @@ pub struct Settings {
     pub(super) cancel: CancelToken,
     progress: Option<Listener>,
     scratch: Option<PathBuf>,
+    pub(super) version: Option<String>,
     /// Other processes that do part of the work.
     pub(super) remote: RemoteWorkers,
 }
@@ -94,6 +95,12 @@ impl Settings {
     /// files next to the store.
     pub fn scratch(mut self, folder: impl Into<PathBuf>) -> Self {
         self.scratch = Some(folder.into());
+        self
+    }
+
+    /// Reads stores as they were in the version of this name. Calls that change a store refuse it.
+    pub fn at_version(mut self, name: impl Into<String>) -> Self {
+        self.version = Some(name.into());
         self
     }
 
@@ -146,6 +153,11 @@ impl Settings {
             }
             Some(Bytes(bytes)) => Ok(bytes),
         }
+    }
+
+    /// The same for stores as they are.
+    pub(super) fn at_now(&self) -> Self {
+        Self { version: None, ..self.clone() }
     }
 
     pub(super) fn budget(&self) -> Result<Budget, Error> {

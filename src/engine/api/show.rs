@@ -201,7 +201,7 @@ impl Store {
                 check_target(out, &inputs_of(self.path()))?;
             }
             let memory = (settings.cap()? / 2).min(MEMORY_MAX) as usize;
-            let mut catalog = open_finished(self.path())?;
+            let mut catalog = open_finished(self.path(), settings)?;
             self.note_fields(&mut catalog, out, &options.selection)?;
             let report = write::export_with(
                 &mut catalog,

@@ -94,11 +94,16 @@ impl Store {
         let path = path.as_ref().to_owned();
         let context = RunContext::new(settings.n_threads(), settings.cancel.clone());
         let (catalog, summary) = guarded_in(&context, || {
-            let mut catalog = open_finished(&path)?;
+            let mut catalog = open_finished(&path, &settings)?;
             let summary = Summary::of(&mut catalog)?;
             Ok((catalog, summary))
         })?;
         Ok(Self { path, settings, context, catalog, summary, session: None })
+    }
+
+    /// Opens a finished store as it was in a version; see [`Store::save_version`]. Errors: as [`Store::open`]; `no-such-part`.
+    pub fn open_version(path: impl AsRef<Path>, name: &str) -> Result<Self, Error> {
+        Self::open_with(path, Settings::new().at_version(name))
     }
 
     /// Path of the store.
@@ -283,15 +288,27 @@ impl Summary {
     }
 }
 
-/// Opens a finished store. Errors: `store-unfinished`.
+/// Opens a finished store, at the version that the settings name. Errors: `store-unfinished`; `no-such-part`.
 #[doc(hidden)]
-pub fn open_finished(path: &Path) -> Result<Catalog, Error> {
-    if_finished(Catalog::open(path)?, path)
+pub fn open_finished(path: &Path, settings: &Settings) -> Result<Catalog, Error> {
+    at_version(if_finished(Catalog::open(path)?, path)?, settings)
 }
 
-/// Opens a finished store to change it. Errors: `store-unfinished`; `busy` while another process changes it.
+/// A store, at the version that the settings name. Errors: `no-such-part`.
+pub(super) fn at_version(mut catalog: Catalog, settings: &Settings) -> Result<Catalog, Error> {
+    Ok(match &settings.version {
+        Some(name) => catalog.version_called(name).map(|(_, version)| catalog.at(&version))?,
+        None => catalog,
+    })
+}
+
+/// Opens a finished store to change it. Errors: `store-unfinished`; `busy` while another process changes it; `bad-version` for a version.
 #[doc(hidden)]
 pub fn open_to_change(path: &Path, settings: &Settings) -> Result<Catalog, Error> {
+    if let Some(name) = &settings.version {
+        let message = format!("version {name} cannot be changed");
+        return Err(Error::new(Code::BadVersion, message).with_help("restore it, and change that"));
+    }
     let catalog = Catalog::open_writable(path)?;
     say_how_locked(&catalog, settings);
     if_finished(catalog, path)

@@ -9,7 +9,7 @@
 //! | `work::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
 //! | `work`, `tasks` | | a cut or a sub-domain as an order, which any process can perform, and a receipt; batches for schedulers |
 //! | `import` | sealed | a mesh made elsewhere: checked, placed in sub-domains, sealed |
-//! | `remesh` | sealed | remesh sub-domains of a finished store from coarse snapshots, with other sizes or to repair damage; undo |
+//! | `remesh` | sealed | remesh sub-domains of a finished store from coarse snapshots, with other sizes or to repair damage; restore older versions |
 //!
 //! The insertion of the surface's vertices may begin before the store exists (`mesh::head_start`). The pipeline receives a
 //! surface, not a path. It prints nothing: it reports [`Event`]s to a [`Watcher`].
@@ -39,7 +39,7 @@ pub use progress::silent;
 pub use progress::{Event, Watcher};
 pub use remesh::{
     FieldChange, Forecast, NewSizes, ResaturateSummary, Resaturated, Resaturation, Values, changed,
-    forecast, forget, recorded_request, resaturate, undo,
+    forecast, forget, previous, recorded_request, resaturate, restore,
 };
 pub use tasks::serve;
 pub use tasks::{

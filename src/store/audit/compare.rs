@@ -9,7 +9,7 @@ use tetdb_schema::record::NO_TET;
 use crate::sealed::{BitSet, Shape, Subdomain, quality_bin};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::shape::is_forcing;
-use tetdb_schema::catalog::QUALITY_BINS;
+use tetdb_schema::catalog::{QUALITY_BINS, SubdomainRow};
 
 /// Tetrahedra by quality.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
@@ -52,14 +52,18 @@ pub struct Qualities {
     pub at_interface: Population,
 }
 
-/// Measures a sealed store, sub-domain by sub-domain. Memory: the bytes given and two bits per tetrahedron and vertex of the
+/// Measures sub-domains of a sealed store, one by one. Memory: the bytes given and two bits per tetrahedron and vertex of the
 /// largest.
 ///
 /// Errors: damage, and failures of the disk.
-pub fn qualities(store: &mut Catalog, memory_bytes: usize) -> Result<Qualities, StoreError> {
+pub fn qualities(
+    store: &Catalog,
+    rows: &[SubdomainRow],
+    memory_bytes: usize,
+) -> Result<Qualities, StoreError> {
     let mut found = Qualities::default();
-    for row in store.subdomains()? {
-        let mut part = store.open_subdomain(row.rank, memory_bytes)?;
+    for row in rows {
+        let mut part = store.open_row(row.clone(), memory_bytes)?;
         found.subdomains += 1;
         found.interface_faces += row.interface_faces;
         let forced = forced_by_face(&mut part)?;

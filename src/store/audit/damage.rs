@@ -1,18 +1,21 @@
 //! All files and records that cannot be read as they were written, with their places.
 //!
 //! [`verify`](super::verify) reads the mesh itself, chunk by chunk. This module reads every file that counts, also kept ones:
-//! coarse snapshots, previous versions, stages, fields.
+//! coarse snapshots, versions, stages, fields.
+
+use std::collections::BTreeSet;
 
 use crate::store::{Catalog, StoreError};
 use tetdb_base::storage::check_cancelled;
 use tetdb_schema::catalog::{CoarseRow, SubdomainRow};
+use tetdb_schema::field::FieldPart;
 
 /// Memory for chunks and redb's cache.
 const MEMORY_BYTES: usize = 8 << 20;
 /// Greatest number of listed faults.
 const LISTED_MAX: usize = 1000;
 
-/// Lists the damage in the files of sub-domains, coarse snapshots, previous versions, stages and fields, in that order.
+/// Lists the damage in the files of sub-domains, coarse snapshots, stages, fields and versions, in that order.
 ///
 /// Errors: a damaged catalog, because it lists the files; failures of the disk that are no damage.
 pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
@@ -68,38 +71,37 @@ impl DamageFound {
         for row in store.coarse_snapshots()? {
             self.add_snapshot(store, row)?;
         }
-        for row in store.previous()? {
-            self.add_part(store, row)?;
-        }
         for stage in store.stages()? {
             self.add_part(store, stage.row)?;
         }
-        self.add_fields(store)
+        self.add_versions(store)
     }
 
-    fn add_fields(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
-        for row in store.subdomains()? {
-            for field in store.fields()? {
-                // A damaged sub-domain is listed elsewhere.
-                let Ok(part) = store.open_row(row.clone(), MEMORY_BYTES) else { break };
-                let opened = store.open_field(&field, &part, MEMORY_BYTES);
-                let checked = opened.and_then(|mut values| Ok(values.check()?));
-                self.note(checked)?;
+    /// The fields of the store, and all that versions have besides.
+    fn add_versions(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
+        let (mut meshes, mut values) = (BTreeSet::new(), BTreeSet::new());
+        meshes.extend(store.subdomains()?.iter().map(SubdomainRow::file));
+        let mut states = vec![store.share()];
+        states.extend(store.versions()?.values().map(|version| store.at(version)));
+        for mut store in states {
+            let parts = store.field_parts()?;
+            for row in store.subdomains()? {
+                if meshes.insert(row.file()) {
+                    self.add_part(&mut store, row.clone())?;
+                }
+                for field in store.fields()? {
+                    let is_its =
+                        |part: &&FieldPart| (part.field, part.rank) == (field.id, row.rank);
+                    if parts.iter().find(is_its).is_some_and(|part| !values.insert(part.file())) {
+                        continue;
+                    }
+                    // A damaged sub-domain is listed elsewhere.
+                    let Ok(mesh) = store.open_row(row.clone(), MEMORY_BYTES) else { break };
+                    let opened = store.open_field(&field, &mesh, MEMORY_BYTES);
+                    let checked = opened.and_then(|mut values| Ok(values.check()?));
+                    self.note(checked)?;
+                }
             }
-        }
-        self.add_previous_fields(store)
-    }
-
-    fn add_previous_fields(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
-        let (rows, fields) = (store.previous()?, store.fields()?);
-        for part in store.previous_field_parts()? {
-            let row = rows.iter().find(|row| row.rank == part.rank);
-            let field = fields.iter().find(|field| field.id == part.field);
-            let (Some(row), Some(field)) = (row, field) else { continue };
-            let Ok(mesh) = store.open_row(row.clone(), MEMORY_BYTES) else { continue };
-            let opened = store.open_field(field, &mesh, MEMORY_BYTES);
-            let checked = opened.and_then(|mut values| Ok(values.check()?));
-            self.note(checked)?;
         }
         Ok(())
     }

@@ -15,6 +15,7 @@ use super::{Finding, Report};
 use crate::sealed::{Corner, Subdomain, SubdomainTotals};
 use crate::store::{Catalog, StoreError};
 use tetdb_base::geom::{Aabb, Point};
+use tetdb_schema::row::RowKind;
 use tetdb_schema::totals::RegionTotals;
 
 /// Recomputed values of one sub-domain.
@@ -154,14 +155,9 @@ pub(super) fn check_catalog(store: &mut Catalog, report: &mut Report) -> Result<
     for rank in expected.into_keys() {
         differs(rank, "it has interfaces and no row of neighbors", report);
     }
-    let mut needed: Vec<[u32; 2]> = Vec::new();
-    for row in store.subdomains()?.into_iter().chain(store.previous()?) {
-        needed.push([row.rank, row.generation]);
-    }
-    let listed: Vec<[u32; 2]> =
-        (store.files()?.iter()).map(|file| [file.subdomain, file.generation]).collect();
-    for missing in needed.iter().filter(|file| !listed.contains(file)) {
-        differs(missing[0], "its file is not listed", report);
+    let (needed, listed) = (store.everywhere(RowKind::Subdomain)?, store.files()?);
+    for row in needed.iter().filter(|row: &&SubdomainRow| !listed.contains(&row.file())) {
+        differs(row.rank, "its file is not listed", report);
     }
     Ok(())
 }

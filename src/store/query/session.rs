@@ -151,7 +151,7 @@ impl QuerySession {
         Ok(session)
     }
 
-    /// Opens questions to these sub-domains, of which each may be a previous version. Errors: as [`QuerySession::open`].
+    /// Opens questions to these sub-domains. Errors: as [`QuerySession::open`].
     pub fn open_rows(
         mut store: Catalog,
         rows: Vec<SubdomainRow>,

@@ -1,15 +1,16 @@
 //! The directory of a store: creating and opening it, the names of its files, and removing files that are not listed.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use tetdb_schema::archive::Archivable;
+use tetdb_schema::archive::{Archivable, from_archive};
 use tetdb_schema::blob::Blob;
 use tetdb_schema::chunk::is_box;
 use tetdb_schema::digest::Digest;
 use tetdb_schema::labels::LabelSet;
 use tetdb_schema::page::FORMAT_VERSION;
-use tetdb_schema::row::{self as rows, FORMAT_MAGIC, RowKind, blob_key};
+use tetdb_schema::row::{self as rows, FORMAT_MAGIC, RowKind, blob_key, is_versioned};
 
 use super::writer_lock::{LOCK, WriterLock};
 use super::{Step, StoreError};
@@ -17,7 +18,7 @@ use crate::sealed::{CoarseSnapshot, Form, SealedError, Subdomain};
 use tetdb_base::storage::{DiskPath, FileId, StoreFile};
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
-    SubdomainRow, TopologyRow, WiresRow,
+    SubdomainRow, TopologyRow, VersionRow, WiresRow,
 };
 
 /// The catalog is small: its redb cache need not be large.
@@ -40,7 +41,7 @@ const WORK: &str = "work";
 /// never wait for each other.
 pub struct Catalog {
     dir: DiskPath,
-    file: StoreFile,
+    pub(super) file: StoreFile,
     /// Identity of `file`; another file has its name once the store has been changed.
     id: Option<FileId>,
     /// `None`: open for reading only.
@@ -48,6 +49,8 @@ pub struct Catalog {
     /// `false`: each commit writes a new file.
     in_place: bool,
     journal_rows: u32,
+    /// For a reader of a version: the key of each of its rows, and the key of the row's copy.
+    pub(super) version: Option<Arc<BTreeMap<u64, u64>>>,
 }
 
 /// Name of the coarse mesh's measure with the number of input triangles.
@@ -86,6 +89,7 @@ impl Catalog {
             lock: Some(lock),
             in_place: true,
             journal_rows: 0,
+            version: None,
         };
         catalog.commit(|step| {
             let mut format = FORMAT_MAGIC.to_vec();
@@ -156,7 +160,15 @@ impl Catalog {
             lock: None,
             in_place: false,
             journal_rows: self.journal_rows,
+            version: self.version.clone(),
         }
+    }
+
+    /// Returns a reader of the same state of the store, at a version.
+    pub fn at(&self, version: &VersionRow) -> Self {
+        let rows = version.rows.iter().map(|&[key, copy]| (key, copy));
+        let rows = rows.filter(|&(key, _)| is_versioned(key)).collect();
+        Self { version: Some(Arc::new(rows)), ..self.share() }
     }
 
     /// Returns whether the store is unchanged since it was opened.
@@ -197,8 +209,15 @@ impl Catalog {
                 break (file, id);
             }
         };
-        let mut catalog =
-            Self { dir: dir.clone(), file, id, lock: None, in_place, journal_rows: 0 };
+        let mut catalog = Self {
+            dir: dir.clone(),
+            file,
+            id,
+            lock: None,
+            in_place,
+            journal_rows: 0,
+            version: None,
+        };
         catalog.check_format()?;
         if !in_place {
             // A file opened for writing has been checked.
@@ -290,7 +309,7 @@ impl Catalog {
         dir.into().join(WORK)
     }
 
-    /// One atomic step: files first, then the rows `describe` sets, in one commit; then files no longer listed go.
+    /// One atomic step: files first, then the rows `describe` sets, in one commit; then files go that neither a row nor a version names.
     ///
     /// Errors: what `describe` returns, before anything is written; failures of the commit, after which the
     /// store is as it was before the step.
@@ -301,6 +320,7 @@ impl Catalog {
         assert!(self.lock.is_some(), "{} is open for reading only", self.dir().display());
         let mut step = Step::new(self.journal_rows);
         describe(&mut step)?;
+        self.settle(&mut step)?;
         for file in &step.listed {
             self.file_path(file.subdomain, file.generation).sync_file()?;
         }
@@ -491,10 +511,8 @@ impl Catalog {
         let path = self.file_path(row.rank, row.generation);
         let opened = Subdomain::open(&path, row.clone(), memory_bytes);
         self.of_one_state(opened, |now| {
-            let is_row = |other: &SubdomainRow| *other == row;
-            Ok(now.subdomains()?.iter().any(is_row)
-                || now.previous()?.iter().any(is_row)
-                || now.stages()?.iter().any(|stage| is_row(&stage.row)))
+            Ok(now.everywhere(RowKind::Subdomain)?.contains(&row)
+                || now.stages()?.iter().any(|stage| stage.row == row))
         })
     }
 
@@ -549,13 +567,6 @@ impl Catalog {
             both[1].merge(&Digest { lanes: row.interface_digest });
         }
         Ok(both)
-    }
-
-    /// Rows of the sub-domains before the last change, by rank.
-    pub fn previous(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
-        let rows: Vec<SubdomainRow> = self.rows(RowKind::Previous)?;
-        rows.iter().try_for_each(|row| self.check_row(row))?;
-        Ok(rows)
     }
 
     /// The files that count, by sub-domain and generation.
@@ -632,23 +643,58 @@ impl Catalog {
         self.row(key)?.ok_or_else(|| self.damaged_row(key, "is missing"))
     }
 
-    fn bytes(&mut self, key: u64) -> Result<Option<Vec<u8>>, StoreError> {
-        let read =
-            self.file.read(key, |value| rows::checked_bytes(key, value).map(<[u8]>::to_vec))?;
-        read.transpose().map_err(|e| self.damaged_row(key, e))
+    /// The key of a row, or of its copy in the version that is read.
+    pub(super) fn place_of(&self, key: u64) -> Option<u64> {
+        match &self.version {
+            Some(rows) if is_versioned(key) => rows.get(&key).copied(),
+            _ => Some(key),
+        }
     }
 
-    fn row<T: Archivable>(&mut self, key: u64) -> Result<Option<T>, StoreError> {
-        let read = self.file.read(key, |value| rows::decode(key, value))?;
-        read.transpose().map_err(|e| self.damaged_row(key, e))
+    fn content<T>(
+        &mut self,
+        key: u64,
+        open: impl FnOnce(&[u8]) -> Result<T, String>,
+    ) -> Result<Option<T>, StoreError> {
+        let Some(place) = self.place_of(key) else { return Ok(None) };
+        let read =
+            self.file.read(place, |value| rows::checked_bytes(place, value).and_then(open))?;
+        match read {
+            None if place != key => Err(self.damaged_row(place, "is missing")),
+            read => read.transpose().map_err(|e| self.damaged_row(place, e)),
+        }
+    }
+
+    pub(super) fn bytes(&mut self, key: u64) -> Result<Option<Vec<u8>>, StoreError> {
+        self.content(key, |bytes| Ok(bytes.to_vec()))
+    }
+
+    pub(super) fn row<T: Archivable>(&mut self, key: u64) -> Result<Option<T>, StoreError> {
+        self.content(key, from_archive)
     }
 
     pub(super) fn rows<T: Archivable>(&mut self, kind: RowKind) -> Result<Vec<T>, StoreError> {
+        Ok(self.keyed(kind)?.into_iter().map(|(_, row)| row).collect())
+    }
+
+    /// Rows of a kind with their keys, ascending.
+    pub(super) fn keyed<T: Archivable>(
+        &mut self,
+        kind: RowKind,
+    ) -> Result<Vec<(u64, T)>, StoreError> {
         let mut all = Vec::new();
+        if let Some(version) = self.version.clone()
+            && is_versioned(kind.key(0, 0))
+        {
+            for &key in version.range(kind.keys()).map(|(key, _)| key) {
+                all.extend(self.row(key)?.map(|row| (key, row)));
+            }
+            return Ok(all);
+        }
         let mut wrong = None;
         self.file.scan(kind.keys(), |key, value| {
             match rows::decode(key, value) {
-                Ok(row) => all.push(row),
+                Ok(row) => all.push((key, row)),
                 Err(reason) => wrong = Some((key, reason)),
             }
             wrong.is_none()

@@ -70,6 +70,19 @@ pub enum StoreError {
         /// Rank of the sub-domain.
         subdomain: u32,
     },
+    /// The store has no version of this name.
+    #[error(
+        "{path} has no version {name}; {}",
+        if known.is_empty() { "it has none".to_owned() } else { format!("there are {}", known.join(", ")) }
+    )]
+    NoVersion {
+        /// The file or folder.
+        path: PathBuf,
+        /// The name.
+        name: String,
+        /// The names of its versions.
+        known: Vec<String>,
+    },
     /// The sub-domain's coarse snapshot was not kept.
     #[error(
         "{path} has no coarse snapshot of sub-domain {subdomain}, from which it could be meshed again"

@@ -23,16 +23,7 @@ impl Catalog {
 
     /// The values of all fields, by field and rank. Errors: damage, such as a row whose field is missing or has other components.
     pub fn field_parts(&mut self) -> Result<Vec<FieldPart>, StoreError> {
-        self.field_parts_of(RowKind::FieldPart)
-    }
-
-    /// The values that undoing the last change brings back, by field and rank. Errors: as [`Catalog::field_parts`].
-    pub fn previous_field_parts(&mut self) -> Result<Vec<FieldPart>, StoreError> {
-        self.field_parts_of(RowKind::PreviousFieldPart)
-    }
-
-    fn field_parts_of(&mut self, kind: RowKind) -> Result<Vec<FieldPart>, StoreError> {
-        let parts: Vec<FieldPart> = self.rows(kind)?;
+        let parts: Vec<FieldPart> = self.rows(RowKind::FieldPart)?;
         let fields = self.fields()?;
         let is_lost = |part: &&FieldPart| {
             let field = fields.iter().find(|field| field.id == part.field);
@@ -40,7 +31,7 @@ impl Catalog {
         };
         match parts.iter().find(is_lost) {
             Some(part) => {
-                let key = kind.key(part.field, part.rank);
+                let key = RowKind::FieldPart.key(part.field, part.rank);
                 Err(self.damaged_row(key, "gives the values of no field"))
             }
             None => Ok(parts),
@@ -52,7 +43,7 @@ impl Catalog {
         self.disk_path().join(file.field_name())
     }
 
-    /// Opens the values of a field in the sub-domain `mesh`, which may be a previous version, with `cache_bytes` for redb.
+    /// Opens the values of a field in the sub-domain `mesh` with `cache_bytes` for redb.
     ///
     /// Errors: damage; [`StoreError::Changed`].
     pub fn open_field(
@@ -62,31 +53,28 @@ impl Catalog {
         cache_bytes: usize,
     ) -> Result<FieldFile, StoreError> {
         let rank = mesh.id().rank();
-        let mut parts = self.field_parts()?;
-        parts.extend(self.previous_field_parts()?);
-        parts.retain(|part| (part.field, part.rank) == (field.id, rank));
-        let own = parts.iter().position(|part| part.generation == mesh.row().generation);
-        let Some(part) = parts.into_iter().nth(own.unwrap_or(0)) else {
+        let is_own = |part: &FieldPart| (part.field, part.rank) == (field.id, rank);
+        let Some(part) = self.field_parts()?.into_iter().find(is_own) else {
             let what = format!("field {}: it has no values here", field.name);
             return Err(mesh.damaged(what).into());
         };
         let row = (field.clone(), part.clone());
         let opened = FieldFile::open(&self.field_path(part.file()), row, mesh, cache_bytes);
-        self.of_one_state(opened, |now| {
-            Ok(now.field_parts()?.contains(&part) || now.previous_field_parts()?.contains(&part))
-        })
+        self.of_one_state(opened, |now| Ok(now.everywhere(RowKind::FieldPart)?.contains(&part)))
     }
 
-    /// Files of fields that count, those of previous values among them.
+    /// Files of fields that count, those of versions among them.
     pub(super) fn field_files(&mut self) -> Result<Vec<FileRow>, StoreError> {
-        let mut parts: Vec<FieldPart> = self.rows(RowKind::FieldPart)?;
-        parts.extend(self.rows(RowKind::PreviousFieldPart)?);
-        Ok(parts.iter().map(FieldPart::file).collect())
+        let parts: Vec<FieldPart> = self.rows(RowKind::FieldPart)?;
+        let mut files: Vec<FileRow> = parts.iter().map(FieldPart::file).collect();
+        files.extend(self.versions()?.into_values().flat_map(|version| version.fields));
+        Ok(files)
     }
 
     /// The numbers of a new field, and of the first of its files.
     pub fn next_field(&mut self) -> Result<(u32, u32), StoreError> {
-        let id = self.fields()?.iter().map(|field| field.id + 1).max().unwrap_or(1);
+        let fields: Vec<FieldRow> = self.everywhere(RowKind::Field)?;
+        let id = fields.iter().map(|field| field.id + 1).max().unwrap_or(1);
         // The journal grows with each step, so that no number comes back soon.
         let steps = self.journal()?.len() as u32;
         let used = self.field_files()?.iter().map(|file| file.generation + 1).max();
@@ -118,33 +106,17 @@ impl Step {
         self.field_unlisted.remove(&part.file());
     }
 
-    /// Sets the values of a field before the last change of a sub-domain; their file must stay listed.
-    pub fn set_previous_field_part(&mut self, part: &FieldPart) {
-        self.put(RowKind::PreviousFieldPart.key(part.field, part.rank), part);
-    }
-
-    /// Removes the row of values before the last change. With `is_file_too`, their file is removed after the commit.
-    pub fn remove_previous_field_part(&mut self, part: &FieldPart, is_file_too: bool) {
-        self.changes.insert(RowKind::PreviousFieldPart.key(part.field, part.rank), None);
-        if is_file_too {
-            self.field_unlisted.insert(part.file());
-        }
-    }
-
     /// Removes the file of values after the commit; another row takes the place of theirs.
     pub fn unlist_field_file(&mut self, part: &FieldPart) {
         self.field_unlisted.insert(part.file());
     }
 
-    /// Forgets a field with its values among `parts` and `previous`; their files are removed after the commit.
-    pub fn remove_field(&mut self, row: &FieldRow, parts: &[FieldPart], previous: &[FieldPart]) {
+    /// Forgets a field with its values among `parts`; their files are removed after the commit.
+    pub fn remove_field(&mut self, row: &FieldRow, parts: &[FieldPart]) {
         self.changes.insert(RowKind::Field.key(0, row.id), None);
         for part in parts.iter().filter(|part| part.field == row.id) {
             self.changes.insert(RowKind::FieldPart.key(part.field, part.rank), None);
             self.unlist_field_file(part);
-        }
-        for part in previous.iter().filter(|part| part.field == row.id) {
-            self.remove_previous_field_part(part, true);
         }
     }
 }

@@ -12,6 +12,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 mod two;
+mod versions;
 mod writer_lock;
 
 pub use catalog::Catalog;
@@ -21,8 +22,9 @@ pub use step::Step;
 pub use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, Measure, NeighborRow, QUALITY_BINS,
     QualityRow, RegionRow, Stage, StageRow, StoreState, SubdomainRow, SubdomainState,
-    SurfaceSource, TopologyRow,
+    SurfaceSource, TopologyRow, VersionRow,
 };
 #[doc(hidden)]
 pub use two::two_subdomains;
+pub use versions::{BEFORE, Difference, NewVersion};
 pub use writer_lock::WriterLock;

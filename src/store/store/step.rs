@@ -6,12 +6,12 @@ use tetdb_schema::archive::Archivable;
 use tetdb_schema::blob::Blob;
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
-    SubdomainRow, TopologyRow, WiresRow,
+    SubdomainRow, TopologyRow, VersionRow, WiresRow,
 };
 use tetdb_schema::labels::LabelSet;
 use tetdb_schema::row::{self as rows, BLOB_PIECE, RowKind, blob_key};
 
-/// Rows to set and remove, files to list and forget; applied together by [`crate::store::Catalog::commit`].
+/// Rows and versions to set and remove, files to list and forget; applied together by [`crate::store::Catalog::commit`].
 pub struct Step {
     pub(super) changes: BTreeMap<u64, Option<Vec<u8>>>,
     pub(super) listed: BTreeSet<FileRow>,
@@ -22,6 +22,8 @@ pub struct Step {
     pub(super) field_listed: BTreeSet<FileRow>,
     /// Files of fields to remove after the commit.
     pub(super) field_unlisted: BTreeSet<FileRow>,
+    /// Versions to set and to remove, by number.
+    pub(super) versions: BTreeMap<u32, Option<VersionRow>>,
     pub(super) journal_rows: u32,
 }
 
@@ -34,6 +36,7 @@ impl Step {
             coarse_listed: BTreeSet::new(),
             field_listed: BTreeSet::new(),
             field_unlisted: BTreeSet::new(),
+            versions: BTreeMap::new(),
             journal_rows,
         }
     }
@@ -89,16 +92,6 @@ impl Step {
     /// Sets the row of a sub-domain.
     pub fn set_subdomain(&mut self, row: &SubdomainRow) {
         self.put(RowKind::Subdomain.key(0, row.rank), row);
-    }
-
-    /// Sets a sub-domain's row before its last change; its file must stay listed.
-    pub fn set_previous(&mut self, row: &SubdomainRow) {
-        self.put(RowKind::Previous.key(0, row.rank), row);
-    }
-
-    /// Removes a sub-domain's row before its last change.
-    pub fn remove_previous(&mut self, rank: u32) {
-        self.changes.insert(RowKind::Previous.key(0, rank), None);
     }
 
     /// Lists a file; it is synced before the commit.
@@ -158,12 +151,5 @@ impl Step {
             pieces = 1;
         }
         self.changes.insert(blob_key(blob, pieces), None);
-    }
-
-    /// Forgets a blob of so many bytes.
-    pub fn remove_blob(&mut self, blob: Blob, bytes: usize) {
-        for piece in 0..=bytes.div_ceil(BLOB_PIECE) as u32 {
-            self.changes.insert(blob_key(blob, piece), None);
-        }
     }
 }

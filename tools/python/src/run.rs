@@ -36,6 +36,8 @@ pub struct JobWords<'py> {
 pub struct SettingWords {
     pub memory: Option<u64>,
     pub threads: Option<usize>,
+    /// The version of stores to read.
+    pub version: Option<String>,
 }
 
 impl SettingWords {
@@ -46,6 +48,9 @@ impl SettingWords {
         }
         if let Some(n) = self.threads {
             settings = settings.threads(n);
+        }
+        if let Some(name) = self.version {
+            settings = settings.at_version(name);
         }
         match board {
             Some(board) => settings.progress(board.listener()),

@@ -417,6 +417,39 @@ impl Store {
         Ok(said)
     }
 
+    /// The versions, as JSON.
+    fn versions(&self, py: Python<'_>) -> PyResult<String> {
+        self.alone(py, |store| Ok(json!(store.versions()?).to_string()))
+    }
+
+    fn save_version(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        note: &str,
+        keep: Option<usize>,
+    ) -> PyResult<Vec<String>> {
+        let mut dropped = Vec::new();
+        self.changed(py, None, |mut store| {
+            dropped = store.save_version(name, note, keep)?;
+            Ok(())
+        })?;
+        Ok(dropped)
+    }
+
+    fn restore_version(&self, py: Python<'_>, name: &str) -> PyResult<()> {
+        self.changed(py, None, |store| Ok(store.restore_version(name, true).map(drop)?))
+    }
+
+    fn drop_version(&self, py: Python<'_>, name: &str) -> PyResult<()> {
+        self.changed(py, None, |mut store| Ok(store.drop_version(name).map(drop)?))
+    }
+
+    /// Two versions compared, as JSON.
+    fn diff_versions(&self, py: Python<'_>, first: &str, second: &str) -> PyResult<String> {
+        self.alone(py, |store| Ok(json!(store.diff_versions(first, second)?).to_string()))
+    }
+
     fn undo(&self, py: Python<'_>) -> PyResult<()> {
         self.changed(py, None, |store| Ok(store.undo().map(drop)?))
     }

@@ -16,7 +16,6 @@ pub struct FieldChanges {
     /// Fields that are dropped.
     dropped: Vec<FieldRow>,
     parts: Vec<FieldPart>,
-    previous: Vec<FieldPart>,
     /// How values were evaluated on the new mesh.
     pub evaluated: Vec<FieldChange>,
 }
@@ -25,8 +24,7 @@ impl FieldChanges {
     /// Drops all fields.
     pub fn drop_all(catalog: &mut Catalog) -> Result<Self, StoreError> {
         let (dropped, parts) = (catalog.fields()?, catalog.field_parts()?);
-        let previous = catalog.previous_field_parts()?;
-        Ok(Self { dropped, parts, previous, ..Self::default() })
+        Ok(Self { dropped, parts, ..Self::default() })
     }
 
     /// Keeps the values of sub-domains that are the same mesh in another file.
@@ -80,18 +78,16 @@ impl FieldChanges {
         Ok(changes)
     }
 
-    /// Lists what was done; with `is_kept`, the values before stay until the next change.
-    pub fn list(&self, step: &mut Step, is_kept: bool) {
+    /// Lists what was done.
+    pub fn list(&self, step: &mut Step) {
         for [old, new] in &self.changed {
             step.set_field_part(new);
-            match is_kept {
-                true => step.set_previous_field_part(old),
-                false if old.file() != new.file() => step.unlist_field_file(old),
-                false => {}
+            if old.file() != new.file() {
+                step.unlist_field_file(old);
             }
         }
         for field in &self.dropped {
-            step.remove_field(field, &self.parts, &self.previous);
+            step.remove_field(field, &self.parts);
         }
     }
 }

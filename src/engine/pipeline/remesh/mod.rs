@@ -1,15 +1,15 @@
-//! Remeshing of sub-domains of a finished store, and its undo.
+//! Remeshing of sub-domains of a finished store, and older versions brought back.
 
 mod fields;
-mod previous;
 mod request;
 mod resaturate;
+mod restore;
 mod run;
 mod sizes;
 mod summary;
 
-pub use previous::{forget, undo};
 pub use request::Resaturation;
 pub use resaturate::{Forecast, changed, forecast, recorded_request, resaturate};
+pub use restore::{forget, previous, restore};
 pub use sizes::{NewSizes, Values};
 pub use summary::{FieldChange, ResaturateSummary, Resaturated};

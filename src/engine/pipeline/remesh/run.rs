@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::fields::FieldChanges;
-use super::previous::Previous;
 use super::request::Resaturation;
 use super::sizes::{Recorded, Values};
 use super::summary::{ResaturateSummary, Resaturated};
@@ -24,12 +23,12 @@ use tetdb_base::storage::{Backing, Budget, DiskPath, ScratchSpace, attempt};
 use tetdb_kernel::mesh::Workspace;
 use tetdb_kernel::sizing::{BackgroundMesh, SizeField};
 use tetdb_schema::blob::{Blob, BlobContent};
-use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow};
+use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow, VersionRow};
 use tetdb_schema::topology::FaceOwners;
 use tetdb_schema::tree::SubtreeMesh;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::sealed::{CoarseSnapshot, Form};
-use tetdb_store::store::{Catalog, StoreError};
+use tetdb_store::store::{BEFORE, Catalog, StoreError};
 
 /// State of one remeshing run.
 pub struct RemeshRun<'a> {
@@ -281,7 +280,7 @@ impl<'a> RemeshRun<'a> {
         made: &BTreeMap<u32, Vec<u8>>,
         (memory, watch): (u64, &Watcher),
     ) -> Result<ResaturateSummary, PipelineError> {
-        let (mut totals, mut old_blobs) = (BTreeMap::new(), Vec::new());
+        let mut totals = BTreeMap::new();
         let mut is_new = self.what.repair;
         for (row, _) in &self.rows {
             let (rank, sealed) = (row.rank, &finished[&row.rank].sealed);
@@ -302,18 +301,18 @@ impl<'a> RemeshRun<'a> {
             is_new |=
                 own.is_some() && own != self.catalog.blob(Blob::SubdomainField(rank))?.as_ref();
             totals.insert(rank, totals_of(sealed));
-            for [now, previous] in Blob::versioned(rank) {
-                old_blobs.push((previous, self.catalog.blob(now)?));
-            }
         }
         if !is_new {
             return self.leave(finished);
         }
         let regions = sum_totals(self.catalog, self.n, &totals)?.regions;
-        let dropped = Previous::of(self.catalog)?;
         let changed =
             |(row, _): &(SubdomainRow, _)| [row.clone(), finished[&row.rank].sealed.row.clone()];
         let changed: Vec<[SubdomainRow; 2]> = self.rows.iter().map(changed).collect();
+        let versions = match self.what.repair {
+            true => self.catalog.versions_with(&changed)?,
+            false => vec![(BEFORE, self.catalog.version_now(VersionRow::default())?)],
+        };
         let fields = match (self.what.drop_fields, self.what.repair) {
             (true, _) => FieldChanges::drop_all(self.catalog)?,
             (false, true) => FieldChanges::keep(self.catalog, &changed)?,
@@ -326,23 +325,13 @@ impl<'a> RemeshRun<'a> {
             false => "resaturate",
         };
         self.catalog.commit(|step| {
-            if !what.repair {
-                dropped.drop(step);
-                for (previous, bytes) in &old_blobs {
-                    if let Some(bytes) = bytes {
-                        step.set_blob(*previous, bytes);
-                    }
-                }
-            }
+            versions.iter().for_each(|(number, version)| step.set_version(*number, version));
             for (row, _) in rows {
                 let (rank, subdomain) = (row.rank, &finished[&row.rank]);
                 step.list_file(rank, subdomain.sealed.row.generation);
                 step.set_subdomain(&subdomain.sealed.row);
                 step.set_blob(Blob::Totals(rank), &totals[&rank].to_bytes());
-                match what.repair {
-                    true => step.unlist_file(rank, row.generation),
-                    false => step.set_previous(row),
-                }
+                step.unlist_file(rank, row.generation);
                 if let (Some(field), Some(requested)) = (made.get(&rank), requested) {
                     step.set_blob(Blob::SubdomainField(rank), field);
                     step.set_blob(Blob::Request(rank), requested);
@@ -361,7 +350,7 @@ impl<'a> RemeshRun<'a> {
                 journal.subdomain = Some(rank);
                 step.append_journal(&journal);
             }
-            fields.list(step, !what.repair);
+            fields.list(step);
             step.set_regions(&regions);
             step.set_state(StoreState::Sealed);
             Ok(())

@@ -252,10 +252,14 @@ def resume(
 
 
 def open(
-    path: str | os.PathLike[str], *, memory: int | str | None = None, threads: int | None = None
+    path: str | os.PathLike[str],
+    *,
+    memory: int | str | None = None,
+    threads: int | None = None,
+    version: str | None = None,
 ) -> Store:
-    """Opens a finished store."""
-    return Store(_path(path), memory=memory, threads=threads)
+    """Opens a finished store, as it was in `version` if that is given."""
+    return Store(_path(path), memory=memory, threads=threads, version=version)
 
 
 def tetrahedralize(

@@ -92,10 +92,13 @@ def count(value: Any, least: int, where: str) -> int:
     return number
 
 
-def settings(memory: int | str | None, threads: int | None) -> dict[str, Any]:
+def settings(
+    memory: int | str | None, threads: int | None, version: str | None = None
+) -> dict[str, Any]:
     if threads is not None:
         threads = count(threads, 1, "threads")
-    return {"memory": None if memory is None else size_of_memory(memory), "threads": threads}
+    cap = None if memory is None else size_of_memory(memory)
+    return {"memory": cap, "threads": threads, "version": version}
 
 
 def size_of_memory(memory: Any) -> int:

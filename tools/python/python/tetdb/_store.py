@@ -226,11 +226,16 @@ class Store:
     """
 
     def __init__(
-        self, path: str, *, memory: int | str | None = None, threads: int | None = None
+        self,
+        path: str,
+        *,
+        memory: int | str | None = None,
+        threads: int | None = None,
+        version: str | None = None,
     ) -> None:
         self.path = path
-        self._how: dict[str, Any] = {"memory": memory, "threads": threads}
-        self._settings = _options.settings(memory, threads)
+        self._how: dict[str, Any] = {"memory": memory, "threads": threads, "version": version}
+        self._settings = _options.settings(memory, threads, version)
         self._handle = (os.getpid(), _native.Store(path, self._settings))
         self._summary: dict[str, Any] | None = None
         self._lock = threading.Lock()
@@ -758,6 +763,35 @@ class Store:
         ranks = _options.ranks(subdomains, "subdomains")
         job = {"ranks": ranks, "sizes": None, "lengths": None, "scale": 1.0, "repair": True}
         self._changed(lambda: self._native.resaturate(job, None))
+
+    def versions(self) -> list[dict[str, Any]]:
+        """The versions, the oldest first: for each `name`, `note`, `saved`, `digest`, counts, `fields`, and the `bytes` that dropping it frees.
+
+        `tetdb.open(path, version=name)` reads one.
+        """
+        return list(json.loads(self._native.versions()))
+
+    def save_version(self, name: str, note: str = "", keep: int | None = None) -> list[str]:
+        """Saves mesh and fields as they are under a name; no file is copied.
+
+        With `keep`, the oldest versions beyond that number are dropped; their names are returned.
+        """
+        keep = None if keep is None else _options.count(keep, 1, "keep")
+        dropped: list[str] = []
+        self._changed(lambda: dropped.extend(self._native.save_version(name, note, keep)))
+        return dropped
+
+    def restore_version(self, name: str) -> None:
+        """Makes mesh and fields those of a version; :meth:`undo` brings back what was before."""
+        self._changed(lambda: self._native.restore_version(name))
+
+    def drop_version(self, name: str) -> None:
+        """Drops a version, and files that nothing else needs."""
+        self._changed(lambda: self._native.drop_version(name))
+
+    def diff_versions(self, first: str, second: str = "now") -> dict[str, Any]:
+        """Compares two versions; `now` is the store as it is. The answer is that of `tetdb version STORE diff --json`."""
+        return dict(json.loads(self._native.diff_versions(first, second)))
 
     def undo(self) -> None:
         """Brings back what the last change replaced."""
