@@ -4,21 +4,21 @@
 
 #[doc(inline)]
 pub use tetdb_engine::api::{
-    AnswerColumn, AnswerFile, AnswerRow, AnswerValue, Answers, BOUNDARY_PREFIX, Bytes, CancelToken,
-    CellArrays, CheckReport, ChunkCounts, CloseReport, ClosedHole, Code, ColorBy, Comparison,
-    Condition, Defect, DefectPlace, EmbedOutside, EmbeddedInfo, EmbeddedKind, Error, Event,
-    Existing, ExportOptions, Exported, ExprError, Field, FieldIds, FieldNumber, FieldPlace,
-    FieldRange, FieldReader, FieldSource, FieldValues, GatherReport, Import, LabelSet, Length,
-    MESH_ENDINGS, MeshFormat, MeshOptions, Mesher, NewField, Optimize, OptionsText, Order,
-    Population, Prediction, Qualities, Query, RegionInfo, Regions, Remesh, RemeshForecast,
-    Remeshed, RepairKind, RepairReport, RepairStep, Reported, ResolveReport, Resolved,
-    SAMPLE_PREFIX, Scalar, Seal, Seed, SeedKind, Settings, Share, ShownTriangles, SizeWarning,
-    Sizes, Snapped, Snapshot, SplitReport, StageInfo, Store, StoreInfo, SubdomainInfo, Subdomains,
-    Suggestion, Summary, Surface, SurfaceRemesh, SurfaceRemeshReport, SurfaceReport, SurfaceWrap,
-    SurfaceWritten, TaskReport, TaskStage, TaskStatus, Tasks, TetId, TransferMethod,
-    TransferredField, VARIABLES, Verification, VerifyLevel, VertexId, WELD_SHARE_MAX, Word,
-    WorkersPrediction, WrapReport, Writers, check_target, csv_head, inputs_of, peak_bytes, short,
-    task_ranges, typed,
+    Adapt, AdaptForecast, AdaptPlan, Adapted, AnswerColumn, AnswerFile, AnswerRow, AnswerValue,
+    Answers, BOUNDARY_PREFIX, Bytes, CancelToken, CellArrays, CheckReport, ChunkCounts,
+    CloseReport, ClosedHole, Code, ColorBy, Comparison, Condition, Defect, DefectPlace,
+    EmbedOutside, EmbeddedInfo, EmbeddedKind, Error, ErrorEstimate, Event, Existing, ExportOptions,
+    Exported, ExprError, Field, FieldIds, FieldNumber, FieldPlace, FieldRange, FieldReader,
+    FieldSource, FieldValues, GatherReport, Import, LabelSet, Length, LongFaces, MESH_ENDINGS,
+    MeshFormat, MeshOptions, Mesher, NewField, Optimize, OptionsText, Order, Population,
+    Prediction, Qualities, Query, RegionInfo, Regions, Remesh, RemeshForecast, Remeshed,
+    RepairKind, RepairReport, RepairStep, Reported, ResolveReport, Resolved, SAMPLE_PREFIX, Scalar,
+    Seal, Seed, SeedKind, Settings, Share, ShownTriangles, SizeWarning, Sizes, Snapped, Snapshot,
+    SplitReport, StageInfo, Store, StoreInfo, SubdomainInfo, Subdomains, Suggestion, Summary,
+    Surface, SurfaceRemesh, SurfaceRemeshReport, SurfaceReport, SurfaceWrap, SurfaceWritten,
+    TaskReport, TaskStage, TaskStatus, Tasks, TetId, TransferMethod, TransferredField, VARIABLES,
+    Verification, VerifyLevel, VertexId, WELD_SHARE_MAX, Word, WorkersPrediction, WrapReport,
+    Writers, check_target, csv_head, inputs_of, peak_bytes, short, task_ranges, typed,
 };
 
 #[cfg(feature = "mpi")]
