@@ -188,7 +188,6 @@ impl From<PipelineError> for Error {
             PipelineError::Store(e) => e.into(),
             PipelineError::Storage(e) => e.into(),
             PipelineError::Query(e) => e.into(),
-            PipelineError::Numbering(e) => e.into(),
             PipelineError::LaterFields { .. } => Self::new(Code::BadField, &e)
                 .with_help("drop these fields first, and add them again afterwards"),
             PipelineError::NothingFilled { .. } => Self::new(Code::NothingFilled, &e)

@@ -7,7 +7,6 @@ use tetdb_base::geom::Point;
 use tetdb_base::storage::RemoteFailure;
 use tetdb_base::storage::StorageError;
 use tetdb_base::surface::SurfaceError;
-use tetdb_io::write::WriteError;
 use tetdb_kernel::boundary::BoundaryError;
 use tetdb_kernel::sizing::SizingError;
 use tetdb_store::query::QueryError;
@@ -36,9 +35,6 @@ pub enum PipelineError {
     /// The mesh before could not be read.
     #[error(transparent)]
     Query(#[from] QueryError),
-    /// Vertices could not be numbered.
-    #[error(transparent)]
-    Numbering(#[from] WriteError),
     /// Pages could not be read, written or held.
     #[error(transparent)]
     Storage(#[from] StorageError),

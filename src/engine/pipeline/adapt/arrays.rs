@@ -1,26 +1,37 @@
 //! The mesh of a store and a field on it as arrays, so that passes over it decode nothing.
 //!
-//! A vertex that several sub-domains share is one node. Arrays that are too large for their share of the memory lie in scratch files;
+//! A vertex that several sub-domains share is one node, which has its number in the first of them; its other numbers are no nodes.
+//! Arrays that are too large for their share of the memory lie in scratch files;
 //! nodes are near each other in them as the vertices are in space.
 
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
-use crate::pipeline::remesh::{Recorded, recorded_field, scratch_folder};
+use crate::pipeline::remesh::{Recorded, recorded_field};
 use tetdb_base::geom::Point;
-use tetdb_base::storage::{ScratchSpace, SpillVec, StorageError, check_cancelled};
-use tetdb_io::write::each_vertex_number;
+use tetdb_base::storage::{ScratchSpace, SpillVec, StorageError, check_cancelled, sort_record};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::field::FieldRow;
-use tetdb_store::store::Catalog;
+use tetdb_schema::ids::{Owner, VertexId};
+use tetdb_store::store::{Catalog, StoreError};
 
 /// A node on the surface.
 pub const ON_SURFACE: u8 = 1;
 /// A node on an interface.
 pub const ON_INTERFACE: u8 = 2;
 
+sort_record! {
+    /// A vertex that several sub-domains may have.
+    struct VertexPlace {
+        id: u64,
+        place: u32,
+    }
+}
+
 /// A sub-domain in the arrays.
 pub struct MeshPart {
     pub row: SubdomainRow,
+    /// Tetrahedra of its coarse mesh: meshed again, it has no fewer.
+    pub least_tets: u64,
     pub first_tet: usize,
     /// Its first place in [`MeshArrays::nodes`].
     pub first_vertex: usize,
@@ -37,7 +48,7 @@ pub struct MeshArrays {
     pub points: SpillVec<[f64; 3]>,
     /// The field at each node.
     pub values: SpillVec<f64>,
-    /// The length with which the mesh around each node was made.
+    /// The length with which the mesh around each node was made; zero for numbers that are no nodes.
     pub present: SpillVec<f64>,
     /// Bits of [`ON_SURFACE`] and [`ON_INTERFACE`] for each node.
     pub skin: SpillVec<u8>,
@@ -59,10 +70,17 @@ impl MeshArrays {
         let (mut parts, mut n_tets, mut n_vertices) = (Vec::new(), 0, 0);
         for row in catalog.subdomains()? {
             let (tets, vertices) = (row.tets as usize, row.vertices as usize);
-            parts.push(MeshPart { row, first_tet: n_tets, first_vertex: n_vertices });
+            let coarse = catalog.coarse_snapshot(row.rank)?;
+            let coarse = coarse.ok_or_else(|| StoreError::NoCoarseSnapshot {
+                path: catalog.dir().to_owned(),
+                subdomain: row.rank,
+            })?;
+            let (least_tets, first_tet, first_vertex) = (coarse.tets, n_tets, n_vertices);
+            parts.push(MeshPart { row, least_tets, first_tet, first_vertex });
             (n_tets, n_vertices) = (n_tets + tets, n_vertices + vertices);
         }
-        let (nodes, n) = numbered(catalog, &parts, n_vertices, (scratch, memory))?;
+        let nodes = numbered(catalog, &parts, n_vertices, (scratch, memory))?;
+        let n = n_vertices;
         let mut mesh = Self {
             parts,
             nodes,
@@ -89,7 +107,7 @@ impl MeshArrays {
         size: &dyn Fn(Point) -> f64,
         memory: u64,
     ) -> Result<(), PipelineError> {
-        let MeshPart { ref row, first_tet, first_vertex } = self.parts[part];
+        let MeshPart { ref row, first_tet, first_vertex, .. } = self.parts[part];
         let mut open = catalog.open_subdomain(row.rank, (memory / 2) as usize)?;
         let mut values = catalog.open_field(field, &open, (memory / 4) as usize)?;
         for chunk in 0..open.vertex_summaries().len() as u32 {
@@ -125,7 +143,7 @@ impl MeshArrays {
         Ok(())
     }
 
-    /// Number of nodes.
+    /// Number of nodes, and of what is none.
     pub fn n_nodes(&self) -> usize {
         self.points.len()
     }
@@ -144,26 +162,38 @@ impl MeshArrays {
     }
 }
 
-/// The node of each vertex of each sub-domain, and the number of nodes.
+/// The node of each vertex of each sub-domain: the first place in the store of a vertex with its id. Errors: damage; the disk.
 fn numbered(
     catalog: &mut Catalog,
     parts: &[MeshPart],
     n_vertices: usize,
     (scratch, memory): (&ScratchSpace, u64),
-) -> Result<(SpillVec<u32>, usize), PipelineError> {
-    let too_many = || StorageError::TooMany { what: "vertices" };
-    u32::try_from(n_vertices).map_err(|_| too_many())?;
+) -> Result<SpillVec<u32>, PipelineError> {
+    let n = u32::try_from(n_vertices).map_err(|_| StorageError::TooMany { what: "vertices" })?;
     let mut nodes = scratch.vec(n_vertices, 0u32);
+    (0..n).for_each(|v| nodes.set(v as usize, v));
     if let [_] = parts {
-        (0..n_vertices).for_each(|v| nodes.set(v, v as u32));
-        return Ok((nodes, n_vertices));
+        return Ok(nodes);
     }
-    let folder = scratch_folder(catalog)?;
-    let (mut place, mut n) = (0, 0);
-    each_vertex_number(catalog, folder.path(), memory as usize, |number, _, _| {
-        nodes.set(place, number as u32);
-        (place, n) = (place + 1, n.max(number as usize + 1));
-        Ok(())
-    })?;
-    Ok((nodes, n))
+    let mut by_id = scratch.sorter::<VertexPlace>();
+    for part in parts {
+        let mut open = catalog.open_subdomain(part.row.rank, memory as usize)?;
+        let own = Some(Owner::Subdomain(open.id()));
+        for (place, vertex) in (part.first_vertex as u32..).zip(open.vertices()) {
+            let id = vertex?.id;
+            // Those that a sub-domain made itself are in no other.
+            if VertexId::from_number(id).map(|id| id.owner) != own {
+                by_id.push(VertexPlace { id, place })?;
+            }
+        }
+    }
+    let mut first: Option<VertexPlace> = None;
+    for vertex in by_id.finish()? {
+        let vertex = vertex?;
+        match first {
+            Some(first) if first.id == vertex.id => nodes.set(vertex.place as usize, first.place),
+            _ => first = Some(vertex),
+        }
+    }
+    Ok(nodes)
 }

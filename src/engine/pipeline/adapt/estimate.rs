@@ -64,6 +64,9 @@ impl ErrorEstimate {
         let (mut most, mut range) = (0.0f64, [f64::INFINITY, f64::NEG_INFINITY]);
         for v in 0..mesh.n_nodes() {
             let (h, value) = (mesh.present.get(v), mesh.values.get(v));
+            if h == 0.0 {
+                continue;
+            }
             most = most.max(curvature.get(v) * h * h);
             range = [range[0].min(value), range[1].max(value)];
         }

@@ -179,6 +179,9 @@ fn describe(
         }
     }
     for v in 0..mesh.n_nodes() {
+        if mesh.present.get(v) == 0.0 {
+            continue;
+        }
         let h = found.h.get(v);
         plan.sizes = [plan.sizes[0].min(h), plan.sizes[1].max(h)];
     }

@@ -3,7 +3,7 @@
 //! The length is `c` times the relative one, between the limits. Sub-domains keep their skin, so from there it grows and shrinks as
 //! the gradation allows, as it does when they are meshed. Both are part of the search for `c`.
 
-use super::arrays::MeshArrays;
+use super::arrays::{MeshArrays, MeshPart};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, SpillVec};
 use tetdb_kernel::sizing::{TETS_PER_LOAD, load_of_tet};
@@ -14,6 +14,10 @@ const NEAR: f64 = 0.005;
 const STEPS_MAX: usize = 30;
 /// Passes over the edges in each direction. In the order of the mesh most lengths are settled after two.
 const PASSES_MAX: usize = 20;
+/// A load below that of one tetrahedron is none.
+const LOAD_MIN: f64 = 1.0 / TETS_PER_LOAD;
+/// Paths along edges of a mesh are longer than straight by this much: 1.06 to 1.11 between vertices of boxes, even or graded.
+const STRETCH: f64 = 1.09;
 /// A change of lengths below this share is none: they are known to a tenth.
 const SETTLED: f64 = 0.005;
 
@@ -36,8 +40,18 @@ pub struct NodeSizes<'a> {
     cones: SpillVec<[f64; 2]>,
     h: SpillVec<f64>,
     /// Loads of the sub-domains with the present lengths.
-    loads: Vec<f64>,
+    loads: Vec<PartLoad>,
     c: f64,
+}
+
+/// The load of a sub-domain.
+#[derive(Clone, Copy, Default)]
+struct PartLoad {
+    /// Of tetrahedra with a vertex of the skin, and their number.
+    at_skin: f64,
+    n_at_skin: f64,
+    /// Of all others.
+    inside: f64,
 }
 
 /// The lengths that a search has found.
@@ -153,9 +167,8 @@ impl<'a> NodeSizes<'a> {
         libm::exp(sum / f64::max(count, 1.0))
     }
 
-    /// Sets the lengths for the factor, and returns the tetrahedra to expect in each sub-domain.
-    ///
-    /// A sub-domain has its present number times the ratio of the loads: what the skin adds to the load's number is in both.
+    /// Sets the lengths for the factor, and returns the tetrahedra to expect in each sub-domain: their present number times the ratio of
+    /// the loads.
     fn tets(&mut self) -> Vec<f64> {
         for v in 0..self.mesh.n_nodes() {
             let h = match self.mesh.skin.get(v) {
@@ -169,22 +182,33 @@ impl<'a> NodeSizes<'a> {
         }
         self.grade();
         let now = self.loads_now();
-        let least = 1.0 / TETS_PER_LOAD;
-        let parts = self.mesh.parts.iter().zip(self.loads.iter().zip(now));
-        let tets = |load: f64, now: f64| now.max(least) / load.max(least);
-        parts.map(|(part, (&load, now))| part.row.tets as f64 * tets(load, now)).collect()
+        let tets = |(part, (before, now)): (&MeshPart, (&PartLoad, PartLoad))| {
+            let ratio = |now: f64, before: f64| now.max(LOAD_MIN) / before.max(LOAD_MIN);
+            // The triangles of the skin stay, and with them what stands on them.
+            let at_skin = before.n_at_skin * ratio(now.at_skin, before.at_skin).max(1.0);
+            let inside = part.row.tets as f64 - before.n_at_skin;
+            let tets = at_skin + inside * ratio(now.inside, before.inside);
+            tets.max(part.least_tets as f64)
+        };
+        self.mesh.parts.iter().zip(self.loads.iter().zip(now)).map(tets).collect()
     }
 
-    /// Loads of the sub-domains.
-    fn loads_now(&mut self) -> Vec<f64> {
-        let mut loads = vec![0.0; self.mesh.parts.len()];
+    fn loads_now(&mut self) -> Vec<PartLoad> {
+        let mut loads = vec![PartLoad::default(); self.mesh.parts.len()];
         for (part, load) in loads.iter_mut().enumerate() {
             let first = self.mesh.parts[part].first_tet;
             for t in first..first + self.mesh.parts[part].row.tets as usize {
                 let tet = self.mesh.tet(t);
                 let [a, b, c, d] = self.mesh.corners(tet);
                 let volume = (b - a).dot((c - a).cross(d - a)) / 6.0;
-                *load += load_of_tet(volume, tet.map(|v| self.h.get(v as usize)));
+                let own = load_of_tet(volume, tet.map(|v| self.h.get(v as usize)));
+                match tet.iter().any(|&v| self.mesh.skin.get(v as usize) != 0) {
+                    true => {
+                        load.at_skin += own;
+                        load.n_at_skin += 1.0;
+                    }
+                    false => load.inside += own,
+                }
             }
         }
         loads
@@ -213,10 +237,10 @@ impl<'a> NodeSizes<'a> {
             return true;
         }
         let points: [Point; 4] = self.mesh.corners(tet);
-        let before = h;
+        let (before, slope) = (h, self.limits.beta / STRETCH);
         for i in 0..4 {
             for j in 0..4 {
-                let most = h[j] + self.limits.beta * points[i].distance(points[j]);
+                let most = h[j] + slope * points[i].distance(points[j]);
                 if most < h[i] && self.mesh.skin.get(tet[i] as usize) == 0 {
                     h[i] = most;
                 }

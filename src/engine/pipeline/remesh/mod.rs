@@ -11,6 +11,6 @@ mod summary;
 pub use previous::{forget, undo};
 pub use request::Resaturation;
 pub use resaturate::{Forecast, changed, forecast, recorded_request, resaturate};
-pub use run::{recorded_field, room, scratch_folder};
+pub use run::{recorded_field, room};
 pub use sizes::{NewSizes, Recorded, Values};
 pub use summary::{FieldChange, ResaturateSummary, Resaturated};

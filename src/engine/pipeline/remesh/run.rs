@@ -413,16 +413,12 @@ impl<'a> RemeshRun<'a> {
 
 /// Scratch space with the remaining budget, for arrays of size fields.
 pub fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, PipelineError> {
-    Ok(ScratchSpace::new(budget.available(), scratch_folder(catalog)?))
-}
-
-/// The folder for scratch files of a call that changes the store, or only reads it.
-pub fn scratch_folder(catalog: &Catalog) -> Result<DiskPath, StoreError> {
     // A store without the writer's lock may be on a read-only disk.
-    match catalog.lock() {
-        Some(_) => catalog.scratch_dir(),
-        None => Ok(std::env::temp_dir().into()),
-    }
+    let folder = match catalog.lock() {
+        Some(_) => catalog.scratch_dir()?,
+        None => std::env::temp_dir().into(),
+    };
+    Ok(ScratchSpace::new(budget.available(), folder))
 }
 
 /// Reads the recorded size field of the whole mesh.
