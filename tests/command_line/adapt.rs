@@ -95,7 +95,7 @@ fn tetrahedra_are_as_many_as_asked_for_and_where_they_are_needed() {
         assert!((n_last as f64 / n - 1.0).abs() < 0.15, "{n_last} {tets}");
         // With equal lengths the error of values falls with the number to the power of two thirds.
         let uniform = first * (n_first as f64 / n_last as f64).powf(2.0 / 3.0);
-        assert!(last < 0.8 * uniform, "{last} {uniform} of {n_last}");
+        assert!(last < 0.9 * uniform, "{last} {uniform} of {n_last}");
     }
     place.run_line("verify a.tetdb --full").succeeds();
     place.run_line("resaturate a.tetdb --undo").succeeds();
@@ -139,7 +139,7 @@ fn what_has_no_derivatives_is_refused() {
         ("--field layer --tets 5q", "usage", 2, "5M"),
         ("--field layer", "usage", 2, "--tets"),
     ] {
-        let done = place.run_line(&format!("adapt a.tetdb {line}"));
+        let done = place.run_line(&format!("adapt a.tetdb {line} --json"));
         let error = done.error();
         assert_eq!((error["code"].as_str(), done.exit()), (Some(code), Some(exit)), "{error}");
         assert!(error["message"].as_str().is_some_and(|text| text.contains(said)), "{error}");

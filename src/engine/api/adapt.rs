@@ -1,7 +1,6 @@
 //! Adapting a mesh to a field: sub-domains meshed again with the lengths that an estimate of its error asks for.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use serde_json::json;
 
@@ -18,7 +17,7 @@ use crate::pipeline::{
 use tetdb_kernel::sizing::SizeOptions;
 use tetdb_schema::field::{FieldPlace, FieldRow};
 use tetdb_schema::word::Word;
-use tetdb_store::store::{Catalog, WriterLock};
+use tetdb_store::store::Catalog;
 
 /// Ratio of two lengths above which they differ, unless another is given. Meshes scatter by as much around their wanted lengths.
 const CHANGE: f64 = 1.25;
@@ -46,7 +45,7 @@ pub struct Adapt {
     settings: Settings,
     field: String,
     estimate: ErrorEstimate,
-    target: Option<Target>,
+    target: Option<AdaptTarget>,
     sizes: Sizes,
     change: f64,
     verify: bool,
@@ -54,7 +53,7 @@ pub struct Adapt {
 
 /// The wanted number of tetrahedra.
 #[derive(Clone, Copy, Debug)]
-enum Target {
+enum AdaptTarget {
     Tets(f64),
     Factor(f64),
 }
@@ -96,13 +95,13 @@ impl Adapt {
 
     /// Wants about `n` tetrahedra in all sub-domains together. Without it and [`Adapt::factor`], as many as now.
     pub fn tets(mut self, n: u64) -> Self {
-        self.target = Some(Target::Tets(n as f64));
+        self.target = Some(AdaptTarget::Tets(n as f64));
         self
     }
 
     /// Wants `factor` times as many tetrahedra as now.
     pub fn factor(mut self, factor: f64) -> Self {
-        self.target = Some(Target::Factor(factor));
+        self.target = Some(AdaptTarget::Factor(factor));
         self
     }
 
@@ -141,10 +140,20 @@ impl Adapt {
     /// `no-coarse-leaf`. After these errors the store is unchanged.
     pub fn run(&self) -> Result<Adapted, Error> {
         let (plan, summary) = guarded(&self.settings, || {
-            let (plan, done) = self.change_mesh()?;
-            let Some((summary, lock)) = done else {
+            let mut open = open_to_change(&self.path, &self.settings)?;
+            let lock = open.lock().expect("it is open for writing");
+            let options = recorded_options(&mut open, &self.path)?;
+            check_recipe(&mut open, false, &self.settings)?;
+            let (plan, sizes) = self.planned(&mut open, &options)?;
+            let ranks = plan.changed();
+            if ranks.is_empty() {
                 return Ok((plan, ResaturateSummary::default()));
-            };
+            }
+            let sizes = Some(sizes);
+            let what = Resaturation { ranks, sizes, repair: false, drop_fields: false };
+            let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
+            let summary = pipeline::resaturate(&mut open, &options, &what, &budget, &watch)?;
+            open.close()?;
             if self.verify {
                 verify_changed(&self.path, &self.settings, lock)?;
             }
@@ -152,26 +161,6 @@ impl Adapt {
         })?;
         let store = Store::open_with(&self.path, self.settings.clone())?;
         Ok(Adapted { plan, remeshed: Remeshed::new(store, summary)? })
-    }
-
-    #[allow(clippy::type_complexity)]
-    fn change_mesh(
-        &self,
-    ) -> Result<(AdaptPlan, Option<(ResaturateSummary, Arc<WriterLock>)>), Error> {
-        let mut open = open_to_change(&self.path, &self.settings)?;
-        let lock = open.lock().expect("it is open for writing");
-        let options = recorded_options(&mut open, &self.path)?;
-        check_recipe(&mut open, false, &self.settings)?;
-        let (plan, sizes) = self.planned(&mut open, &options)?;
-        let ranks = plan.changed();
-        if ranks.is_empty() {
-            return Ok((plan, None));
-        }
-        let what = Resaturation { ranks, sizes: Some(sizes), repair: false, drop_fields: false };
-        let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
-        let summary = pipeline::resaturate(&mut open, &options, &what, &budget, &watch)?;
-        open.close()?;
-        Ok((plan, Some((summary, lock))))
     }
 
     fn planned(
@@ -211,8 +200,8 @@ impl Adapt {
         };
         let tets: u64 = open.subdomains()?.iter().map(|row| row.tets).sum();
         let tets = match self.target {
-            Some(Target::Tets(n)) => number("number of tetrahedra", n, 0.0)?,
-            Some(Target::Factor(factor)) => number("factor", factor, 0.0)? * tets as f64,
+            Some(AdaptTarget::Tets(n)) => number("number of tetrahedra", n, 0.0)?,
+            Some(AdaptTarget::Factor(factor)) => number("factor", factor, 0.0)? * tets as f64,
             None => tets as f64,
         };
         let change = number("ratio of lengths", self.change, 1.0)?;
