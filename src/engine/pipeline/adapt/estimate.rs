@@ -233,6 +233,77 @@ fn curvature_of_jumps(
 mod tests {
     use super::*;
 
+    /// The unit cube as a grid of `n³` cells of six tetrahedra, with a field.
+    fn grid(n: u32, value: impl Fn(Point) -> f64) -> MeshArrays {
+        let scratch = ScratchSpace::boundless();
+        let m = n + 1;
+        let (mut points, mut values, mut skin) =
+            (scratch.builder(), scratch.builder(), scratch.builder());
+        for k in 0..m * m * m {
+            let at = [k % m, k / m % m, k / m / m];
+            let p = Point::from_array(at.map(|i| f64::from(i) / f64::from(n)));
+            points.push(p.to_array());
+            values.push(value(p));
+            skin.push(if at.iter().any(|i| i % n == 0) { ON_SURFACE } else { 0 });
+        }
+        let mut tets = scratch.builder();
+        for k in 0..n * n * n {
+            let low = k % n + k / n % n * m + k / n / n * m * m;
+            let steps = [1, m, m * m];
+            for ([i, j, l], is_odd) in [
+                ([0, 1, 2], false),
+                ([1, 2, 0], false),
+                ([2, 0, 1], false),
+                ([0, 2, 1], true),
+                ([2, 1, 0], true),
+                ([1, 0, 2], true),
+            ] {
+                let a = low + steps[i];
+                let b = a + steps[j];
+                let c = b + steps[l];
+                tets.push(if is_odd { [low, b, a, c] } else { [low, a, b, c] });
+            }
+        }
+        let n_points = points.len();
+        MeshArrays {
+            parts: Vec::new(),
+            nodes: scratch.vec(0, 0),
+            tets: tets.finish(),
+            points: points.finish(),
+            values: values.finish(),
+            present: scratch.vec(n_points, 1.0 / f64::from(n)),
+            skin: skin.finish(),
+        }
+    }
+
+    /// Where the second derivative of exp(-x/e) falls, lengths grow as its power; those of a quadratic are everywhere the same.
+    #[test]
+    fn relative_lengths_are_powers_of_known_second_derivatives() {
+        const E: f64 = 0.2;
+        let scratch = ScratchSpace::boundless();
+        for (estimate, exponent) in
+            [(ErrorEstimate::Hessian, 2.0 / 7.0), (ErrorEstimate::Jump, 2.0 / 5.0)]
+        {
+            for is_layer in [true, false] {
+                let mut mesh = grid(20, |p| match is_layer {
+                    true => (-p.x / E).exp(),
+                    false => p.x * p.x + p.y * p.y - 2.0 * p.z * p.z,
+                });
+                let sizes = estimate.relative_sizes(&mut mesh, &scratch).expect("memory alone");
+                let mut sizes = sizes.expect("a field that bends");
+                let at = |x: usize| x + 10 * 21 + 10 * 21 * 21;
+                for x in 4..17 {
+                    let growth = if is_layer { 1.0 / 20.0 / E * exponent } else { 0.0 };
+                    let ratio = sizes.get(at(x + 1)) / sizes.get(at(x));
+                    assert!((ratio / growth.exp() - 1.0).abs() < 0.01, "{estimate:?} {x}: {ratio}");
+                }
+            }
+            let mut linear = grid(4, |p| 300.0 + p.x - 2.0 * p.y);
+            let sizes = estimate.relative_sizes(&mut linear, &scratch).expect("memory alone");
+            assert!(sizes.is_none());
+        }
+    }
+
     #[test]
     fn greatest_eigenvalues_of_known_matrices() {
         for (matrix, expected) in [
