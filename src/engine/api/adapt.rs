@@ -196,7 +196,8 @@ impl Adapt {
             false => Err(Error::new(
                 Code::BadSize,
                 format!("a {what} of {x} makes no sense, expected one above {least}"),
-            )),
+            )
+            .with_help("give a plain number, such as 2")),
         };
         let tets: u64 = open.subdomains()?.iter().map(|row| row.tets).sum();
         let tets = match self.target {
