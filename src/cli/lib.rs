@@ -2,6 +2,7 @@
 
 #![warn(missing_docs)]
 
+mod adapt;
 mod args;
 mod check;
 mod check_report;
@@ -201,6 +202,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Work(args) => tasks::work(args, console),
         Command::Gather(args) => tasks::gather(args, console),
         Command::Resaturate(args) => resaturate::run(args, console),
+        Command::Adapt(args) => adapt::run(args, console),
         Command::Check(args) => check::run(args, console),
         Command::Info(args) => info::run(args, console),
         Command::Query(args) => query::run(args, console),
@@ -227,6 +229,7 @@ fn writes_files(command: &Command) -> bool {
     matches!(
         command,
         Command::Resaturate(_)
+            | Command::Adapt(_)
             | Command::Export(_)
             | Command::Snapshot(_)
             | Command::Report(_)

@@ -23,6 +23,7 @@ pub fn names(command: &Command) -> Vec<(&'static str, String)> {
         Command::Work(a) => (Some(a.store.clone()), None),
         Command::Gather(a) => (Some(a.store.clone()), None),
         Command::Resaturate(a) => (Some(a.store.clone()), None),
+        Command::Adapt(a) => (Some(a.store.clone()), None),
         Command::Info(a) => (Some(a.of.store.clone()), None),
         Command::Digest(a) => (Some(a.store.clone()), None),
         Command::Query(a) => (Some(a.store.clone()), None),

@@ -1,10 +1,10 @@
 //! The command `resaturate`: meshes sub-domains of a finished store again.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::args::ResaturateArgs;
+use super::args::{ResaturateArgs, RunArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::info::{hex, share_below_two};
@@ -13,7 +13,7 @@ use super::transfer::how;
 use super::words::count;
 use super::{memory, mesh};
 use tetdb_engine::api::{
-    Code, Remesh, RemeshForecast, Remeshed, Settings, Store, inputs_of, short,
+    AdaptPlan, Code, Remesh, RemeshForecast, Remeshed, Settings, Store, inputs_of, short,
 };
 
 pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
@@ -27,7 +27,8 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
     }
     if args.undo {
         let store = Store::open_with(&args.store, settings.clone())?;
-        return finish(args, &store.undo_reported(verify)?, &settings, console);
+        let undone = store.undo_reported(verify)?;
+        return finish((&args.store, &args.run), (&undone, None), &settings, console);
     }
     let remesh = Remesh::new(&args.store, settings.clone()).verify(verify);
     let remesh = match (args.changed, args.repair) {
@@ -51,7 +52,7 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
         return Ok(0);
     }
     console.done();
-    finish(args, &remeshed, &settings, console)
+    finish((&args.store, &args.run), (&remeshed, None), &settings, console)
 }
 
 /// Refuses options that exclude each other, before anything is read.
@@ -114,26 +115,30 @@ fn print_forecast(list: &[RemeshForecast], console: &Console) {
 }
 
 /// Exports the mesh and prints the changes.
-fn finish(
-    args: &ResaturateArgs,
-    remeshed: &Remeshed,
+pub fn finish(
+    (store, run): (&Path, &RunArgs),
+    (remeshed, plan): (&Remeshed, Option<&AdaptPlan>),
     settings: &Settings,
     console: &Console,
 ) -> Result<u8, Failure> {
-    mesh::write_exports(&args.store, &args.run, settings, console)?;
+    mesh::write_exports(store, run, settings, console)?;
     let cap = settings.cap()?;
     let summary = remeshed.store.summary();
     let (all, digest) = (summary.subdomains.len(), &summary.digest);
     let unchanged = all - remeshed.subdomains.len();
     if console.is_json() {
-        console.answer(&json!({
-            "schema": 1, "store": args.store.display().to_string(), "digest": digest,
+        let mut answer = json!({
+            "schema": 1, "store": store.display().to_string(), "digest": digest,
             "subdomains": objects(remeshed),
             "unchanged": unchanged, "fields": remeshed.fields,
             "memory_cap_bytes": cap, "peak_bytes": memory::peak(),
             "pages_read": remeshed.pages_read, "pages_written": remeshed.pages_written,
             "frames_used": remeshed.frames_used,
-        }));
+        });
+        if let Some(plan) = plan {
+            answer["plan"] = json!(plan);
+        }
+        console.answer(&answer);
         return Ok(0);
     }
     if console.is_quiet() {

@@ -15,7 +15,7 @@ const FREE: [&str; 5] =
     ["options", "subdomains[].sizes.options", "findings", "measures.chunks", "qualities"];
 
 /// The commands of each section, in order. The surfaces are written first.
-const RUNS: [(&str, &[&str]); 21] = [
+const RUNS: [(&str, &[&str]); 22] = [
     ("sample", &["sample box,h=0.045 -o box.stl", "sample sphere,h=0.2 -o sphere.stl"]),
     (
         "check",
@@ -68,9 +68,17 @@ const RUNS: [(&str, &[&str]); 21] = [
             "field a.tetdb list",
             "field a.tetdb drop T",
             "field a.tetdb add q --at tets --from x",
+            "field a.tetdb add w --at vertices --from x*x*x",
         ],
     ),
     ("transfer", &["transfer a.tetdb wells.tetdb"]),
+    (
+        "adapt",
+        &[
+            "adapt a.tetdb --field w --factor 0.9 --dry-run",
+            "adapt a.tetdb --field w --factor 1.5 --change 1.01",
+        ],
+    ),
     ("snapshot", &["snapshot a.tetdb a.svg"]),
     ("report", &["report a.tetdb a.html"]),
     (

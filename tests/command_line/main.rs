@@ -1,5 +1,6 @@
 //! The program as its users see it: processes, files, exit codes.
 
+mod adapt;
 mod cells;
 mod check;
 mod closed;

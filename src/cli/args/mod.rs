@@ -1,5 +1,6 @@
 //! What can be typed.
 
+mod adapt;
 mod field;
 mod import;
 mod mesh;
@@ -17,6 +18,7 @@ mod words;
 
 use clap::{Parser, Subcommand};
 
+pub use adapt::AdaptArgs;
 pub use field::{AddFieldArgs, FieldAction, FieldArgs};
 pub use import::ImportArgs;
 pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
@@ -88,6 +90,12 @@ pub enum Command {
     /// unless options say otherwise: single lengths replace those of the first run, shapes and regions are added to its. Without any, the
     /// sub-domains are meshed as they were.
     Resaturate(Box<ResaturateArgs>),
+    /// Mesh sub-domains again with the lengths that are best for a field
+    ///
+    /// The error of the field, linear in tetrahedra, is estimated at each vertex; lengths get shorter where it is large and longer where it
+    /// is small, for a wanted number of tetrahedra. The surface and interfaces stay, fields are evaluated on the new mesh, and
+    /// `tetdb resaturate --undo` brings back what was before.
+    Adapt(Box<AdaptArgs>),
     /// Say whether a surface can be meshed, and where it cannot
     ///
     /// Holes, T-junctions, triangles without area, repeated ones and crossings are listed with their places. Nothing is changed unless
@@ -172,6 +180,7 @@ impl Command {
             Self::Work(a) => a.json,
             Self::Gather(a) => a.json,
             Self::Resaturate(a) => a.run.json,
+            Self::Adapt(a) => a.run.json,
             Self::Check(a) => a.json,
             Self::Info(a) => a.of.json,
             Self::Digest(a) => a.json,

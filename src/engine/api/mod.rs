@@ -18,13 +18,15 @@
 //! | `ask`, `condition`, `answer_rows`, `answer_file` | questions and their answers |
 //! | `fields`, `field_spec`, `field_sources`, `transfer` | values kept with a finished mesh, and brought to another |
 //! | `import` | a mesh made by another program as a store |
-//! | `remesh`, `remesh_sizes`, `versions` | meshing sub-domains again; versions of a store |
+//! | `remesh`, `remesh_sizes`, `adapt` | meshing sub-domains again, with given sizes or those that a field asks for |
+//! | `versions` | states of a store under names |
 //! | `tasks`, `tasks_status` | one mesh by the tasks of a batch scheduler |
 //! | `mpi` | one mesh by the ranks of an MPI program |
 //! | `show`, `picture`, `page`, `targets` | files for other programs, pictures, the page; protection of input files |
 //! | `error`, `from_errors` | errors |
 //! | `job`, `preflight`, `replace`, `guard` | internal: the job record; early refusals; replacing a store; the end of unwinding |
 
+mod adapt;
 mod answer_file;
 mod answer_rows;
 mod ask;
@@ -84,8 +86,10 @@ mod verify_server;
 mod verify_shared;
 mod versions;
 
+pub use crate::pipeline::{AdaptForecast, AdaptPlan, ErrorEstimate, LongFaces};
 pub use crate::pipeline::{MeshOptions, OptionsText};
 pub use crate::view::Excess;
+pub use adapt::{Adapt, Adapted};
 pub use answer_file::AnswerFile;
 pub use answer_rows::{AnswerColumn, AnswerRow, AnswerValue, csv_head};
 pub use ask::{Answers, ChunkCounts, Order, Query, TetId, VertexId};

@@ -262,14 +262,7 @@ impl Remesh {
 
     /// The options of the store, and the request for the pipeline.
     fn request(&self, open: &mut Catalog) -> Result<(Options, Resaturation), Error> {
-        let job = open.job()?;
-        if job::is_imported(&job) {
-            let message = "the store was imported: its sub-domains have no coarse meshes from which they could be meshed again";
-            return Err(Error::new(Code::NoCoarseLeaf, message)
-                .at(self.path.display())
-                .with_help("mesh its surface anew: it is surface.obj in the store"));
-        }
-        let options = Options::from(job::options_of(&job, &self.path)?);
+        let options = recorded_options(open, &self.path)?;
         let listed = match &self.ranks {
             RemeshRanks::Listed(ranks) => ranks.clone(),
             RemeshRanks::Changed => BTreeSet::new(),
@@ -287,8 +280,20 @@ impl Remesh {
     }
 }
 
+/// The options of a store with coarse meshes. Errors: it was imported.
+pub(super) fn recorded_options(open: &mut Catalog, path: &Path) -> Result<Options, Error> {
+    let job = open.job()?;
+    if job::is_imported(&job) {
+        let message = "the store was imported: its sub-domains have no coarse meshes from which they could be meshed again";
+        return Err(Error::new(Code::NoCoarseLeaf, message)
+            .at(path.display())
+            .with_help("mesh its surface anew: it is surface.obj in the store"));
+    }
+    Ok(Options::from(job::options_of(&job, path)?))
+}
+
 impl Remeshed {
-    fn new(store: Store, summary: ResaturateSummary) -> Result<Self, Error> {
+    pub(super) fn new(store: Store, summary: ResaturateSummary) -> Result<Self, Error> {
         let fields = store.transferred(summary.fields)?;
         let inserted = summary.parts.iter().map(|part| part.fine.as_ref());
         Ok(Self {
@@ -304,7 +309,11 @@ impl Remeshed {
 }
 
 /// A repair must follow the recipe that began the store. Any other change only reports that the recipe differs.
-fn check_recipe(open: &mut Catalog, is_repair: bool, settings: &Settings) -> Result<(), Error> {
+pub(super) fn check_recipe(
+    open: &mut Catalog,
+    is_repair: bool,
+    settings: &Settings,
+) -> Result<(), Error> {
     if is_repair {
         return job::check_recipe(open);
     }
@@ -341,8 +350,8 @@ fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), StoreError> {
 }
 
 /// Verifies a changed store, against its surface if that can be read, and records it. `lock` was held since the change.
-fn verify_changed(
-    path: &std::path::Path,
+pub(super) fn verify_changed(
+    path: &Path,
     settings: &Settings,
     lock: Arc<WriterLock>,
 ) -> Result<(), Error> {

@@ -123,7 +123,7 @@ fn field_of_surface(
 }
 
 /// Least and greatest length. Shares refer to the diagonal of the bounding box of all sub-domains. Errors: the two cross.
-fn limits(open: &mut Catalog, sizes: &SizeOptions) -> Result<[f64; 2], Error> {
+pub(super) fn limits(open: &mut Catalog, sizes: &SizeOptions) -> Result<[f64; 2], Error> {
     let rows = open.subdomains()?;
     let side = |axis: usize| {
         let low = rows.iter().map(|r| r.bounds[0][axis]);

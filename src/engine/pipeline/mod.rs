@@ -9,11 +9,13 @@
 //! | `work::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
 //! | `work`, `tasks` | | a cut or a sub-domain as an order, which any process can perform, and a receipt; batches for schedulers |
 //! | `import` | sealed | a mesh made elsewhere: checked, placed in sub-domains, sealed |
+//! | `adapt` | | lengths for sub-domains to remesh, from the error of a field |
 //! | `remesh` | sealed | remesh sub-domains of a finished store from coarse snapshots, with other sizes or to repair damage; restore older versions |
 //!
 //! The insertion of the surface's vertices may begin before the store exists (`mesh::head_start`). The pipeline receives a
 //! surface, not a path. It prints nothing: it reports [`Event`]s to a [`Watcher`].
 
+mod adapt;
 mod error;
 mod import;
 mod mesh;
@@ -26,6 +28,9 @@ mod tree;
 mod work;
 mod workers;
 
+pub use adapt::{
+    AdaptForecast, AdaptPlan, AdaptRequest, ErrorEstimate, LongFaces, plan_adaptation,
+};
 pub use error::PipelineError;
 pub use import::{BadMesh, Placed, place, write as write_placed};
 pub use mesh::coarse_mesh;
@@ -47,5 +52,6 @@ pub use tasks::{
     gather, is_being_worked, perform, plan as plan_tasks, status,
 };
 pub use tetdb_schema::work::{WorkKind, from_bytes, to_bytes};
+pub use tree::bounds;
 pub use work::{FineReport, RemoteWorkers, WorkerPool, stage_faces};
 pub use workers::{WorkerFn, run_jobs};

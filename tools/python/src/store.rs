@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use serde_json::json;
 use tetdb::data::Hit;
 use tetdb::{
-    CancelToken, ColorBy, ExportOptions, FieldIds, FieldPlace, FieldSource, NewField, Order,
+    CancelToken, ColorBy, ErrorEstimate, ExportOptions, FieldIds, FieldPlace, FieldSource, NewField, Order,
     Snapshot, TransferMethod, VerifyLevel, Word,
 };
 
@@ -83,6 +83,19 @@ struct RemeshWords<'py> {
     lengths: Option<Vec<f64>>,
     scale: f64,
     repair: bool,
+}
+
+/// What a mesh is adapted to.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct AdaptWords<'py> {
+    field: String,
+    tets: Option<u64>,
+    factor: Option<f64>,
+    estimate: String,
+    sizes: SizeWords<'py>,
+    change: f64,
+    dry_run: bool,
 }
 
 impl Store {
@@ -361,6 +374,30 @@ impl Store {
             remesh.run()?;
             Ok(())
         })
+    }
+
+    /// Adapts the mesh; the plan, as JSON.
+    fn adapt(
+        &self,
+        py: Python<'_>,
+        words: AdaptWords<'_>,
+        callable: Option<Py<PyAny>>,
+    ) -> PyResult<String> {
+        let sizes = words.sizes.sizes(py)?;
+        let AdaptWords { field, tets, factor, estimate, change, dry_run, .. } = words;
+        let estimate = ErrorEstimate::from_word(&estimate).unwrap_or_default();
+        let mut plan = String::new();
+        self.changed(py, callable.as_ref(), |store| {
+            let adapt = store.adapt(&field).estimate(estimate).sizes(sizes).change(change);
+            let adapt = match (tets, factor) {
+                (Some(n), _) => adapt.tets(n),
+                (None, factor) => adapt.factor(factor.unwrap_or(1.0)),
+            };
+            let found = if dry_run { adapt.plan()? } else { adapt.run()?.plan };
+            plan = json!(found).to_string();
+            Ok(())
+        })?;
+        Ok(plan)
     }
 
     /// The fields, as JSON.

@@ -71,3 +71,18 @@ def test_going_to_another_mesh(st: tetdb.Store, tmp_path: Path) -> None:
     assert other.fields["T"].digest != digest
     other.undo()
     assert other.fields["T"].digest == digest
+
+
+def test_meshes_adapt_to_fields(tmp_path: Path) -> None:
+    with tetdb.mesh(tetdb.sample("box,h=0.08"), tmp_path / "box.tetdb") as st:
+        st.fields.add("u", "exp(-x/0.2)")
+        n = st.n_tets
+        plan = st.adapt("u", factor=2.0, estimate="jump", dry_run=True)
+        assert plan["subdomains"][0]["is_changed"] and st.n_tets == n
+        plan = st.adapt("u", tets=2 * n, hmin=0.01)
+        assert 0.8 < st.n_tets / plan["wanted_tets"] < 1.2
+        for bad in ({"tets": 0}, {"factor": -1.0}, {"estimate": "guess"}, {"tets": 5, "factor": 2.0}):
+            with pytest.raises(tetdb.TetdbError):
+                st.adapt("u", **bad)
+        with pytest.raises(tetdb.TetdbError):
+            st.adapt("nothing", factor=1.0)

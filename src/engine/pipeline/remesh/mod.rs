@@ -11,5 +11,6 @@ mod summary;
 pub use request::Resaturation;
 pub use resaturate::{Forecast, changed, forecast, recorded_request, resaturate};
 pub use restore::{forget, previous, restore};
-pub use sizes::{NewSizes, Values};
+pub use run::{recorded_field, room};
+pub use sizes::{NewSizes, Recorded, Values};
 pub use summary::{FieldChange, ResaturateSummary, Resaturated};

@@ -141,7 +141,10 @@ impl<'a> RemeshRun<'a> {
             let field = match &self.what.sizes {
                 Some(sizes) => {
                     let first = from;
-                    from += row.tets as usize;
+                    from += match values {
+                        Some(Values::Nearest(_)) => row.vertices,
+                        _ => row.tets,
+                    } as usize;
                     recorded.build_new(self.catalog, row.rank, sizes, first, memory)?
                 }
                 None => recorded.own(self.catalog, row.rank)?,
@@ -164,6 +167,7 @@ impl<'a> RemeshRun<'a> {
             let faces = kept.facets + kept.interface_faces;
             let skin = POINT * kept.vertices + FACE * faces + LEAF * leaves;
             match values {
+                Some(Values::Nearest(_)) => skin + BackgroundMesh::bytes(row.vertices, 0),
                 Some(_) => skin + BackgroundMesh::bytes(row.vertices, row.tets),
                 None => skin,
             }
@@ -175,13 +179,15 @@ impl<'a> RemeshRun<'a> {
     /// Checks the number of lengths. Errors: not one for each tetrahedron or vertex.
     fn count(&self, values: &Values) -> Result<(), PipelineError> {
         let tets: u64 = self.rows.iter().map(|(row, _)| row.tets).sum();
-        let vertices = match &self.rows[..] {
-            [(row, _)] => row.vertices,
+        let vertices = match (values, &self.rows[..]) {
+            (Values::Nearest(_), rows) => rows.iter().map(|(row, _)| row.vertices).sum(),
+            (_, [(row, _)]) => row.vertices,
             _ => 0,
         };
         let (found, expected) = match values {
             Values::Tets(h) => (h.len() as u64, tets),
             Values::Vertices(h) => (h.len() as u64, vertices),
+            Values::Nearest(h) => (h.len() as u64, vertices),
         };
         match found == expected {
             true => Ok(()),
@@ -197,14 +203,16 @@ impl<'a> RemeshRun<'a> {
     ) -> Result<ResaturateSummary, PipelineError> {
         let of = |field: &SizeField| field.bytes() as u64;
         let own: u64 = fields.values().flatten().map(of).sum();
-        let requested = self.what.sizes.as_ref().and_then(|s| s.field.as_ref());
+        let sizes = self.what.sizes.as_ref();
+        let requested = sizes.and_then(|s| s.field.as_ref()).map_or(0, of)
+            + sizes.and_then(|s| s.values.as_ref()).map_or(0, Values::bytes);
         // The fields of the sub-domains are also held as bytes until they are committed.
         let made: BTreeMap<u32, Vec<u8>> = (fields.iter())
             .filter_map(|(&rank, field)| Some((rank, field.as_ref()?.to_bytes())))
             .filter(|_| self.what.sizes.is_some())
             .collect();
         let encoded: u64 = made.values().map(|bytes| bytes.len() as u64).sum();
-        let held = own + encoded + of(&self.field) + requested.map_or(0, of);
+        let held = own + encoded + of(&self.field) + requested;
         let _fields = budget.lease(held, "the size fields")?;
         let plan = Plan::new(budget.cap(), held)?;
         let leased = plan.frames + plan.redb + plan.redb / 2 + plan.buffers;
@@ -393,7 +401,7 @@ impl<'a> RemeshRun<'a> {
 }
 
 /// Scratch space with the remaining budget, for arrays of size fields.
-pub(super) fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, PipelineError> {
+pub fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, PipelineError> {
     // A store without the writer's lock may be on a read-only disk.
     let folder = match catalog.lock() {
         Some(_) => catalog.scratch_dir()?,

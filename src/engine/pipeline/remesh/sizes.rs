@@ -6,7 +6,7 @@ use tetdb_store::sealed::SealedError;
 use tetdb_store::store::{Catalog, StoreError};
 
 use tetdb_base::geom::Point;
-use tetdb_base::storage::{ScratchSpace, check_cancelled};
+use tetdb_base::storage::{FrozenSpillVec, ScratchSpace, check_cancelled};
 use tetdb_kernel::sizing::{
     BackgroundMesh, SizeConstraint, SizeField, SizingError, TETS_PER_LOAD, load_of_tet,
 };
@@ -25,13 +25,18 @@ pub enum Values {
     Tets(Vec<f64>),
     /// One per vertex of the only remeshed sub-domain, in its sealed order.
     Vertices(Vec<f64>),
+    /// One per vertex of the remeshed sub-domains, by rank, each in its sealed order; elsewhere that of the nearest vertex. A seventh of
+    /// the memory of lengths that are linear in tetrahedra.
+    Nearest(FrozenSpillVec<f64>),
 }
 
 impl Values {
     /// Memory held, in bytes.
     pub fn bytes(&self) -> u64 {
-        let (Self::Tets(h) | Self::Vertices(h)) = self;
-        8 * h.len() as u64
+        match self {
+            Self::Tets(h) | Self::Vertices(h) => 8 * h.len() as u64,
+            Self::Nearest(h) => h.bytes() as u64,
+        }
     }
 }
 
@@ -232,12 +237,16 @@ fn on_mesh(
     for chunk in part.vertex_chunks() {
         points.extend(chunk?.records.iter().map(|v| Point::from_array(v.point)));
     }
-    let mut tets = Vec::with_capacity(n_tets);
-    for chunk in part.tet_chunks() {
-        check_cancelled();
-        tets.extend(chunk?.records.iter().map(|t| t.nodes));
+    let mut tets = Vec::new();
+    if !matches!(values, Values::Nearest(_)) {
+        tets.reserve_exact(n_tets);
+        for chunk in part.tet_chunks() {
+            check_cancelled();
+            tets.extend(chunk?.records.iter().map(|t| t.nodes));
+        }
     }
     let h = match values {
+        Values::Nearest(h) => (from..from + n_vertices).map(|i| length(h.get(i))).collect(),
         Values::Vertices(h) => h[from..from + n_vertices].iter().map(|&h| length(h)).collect(),
         Values::Tets(h) => {
             let mut sums = vec![(0.0, 0u32); n_vertices];

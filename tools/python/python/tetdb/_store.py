@@ -721,6 +721,69 @@ class Store:
         }
         self._changed(lambda: self._native.resaturate(job, _options.listener(progress)))
 
+    def adapt(
+        self,
+        field: str,
+        *,
+        tets: int | None = None,
+        factor: float | None = None,
+        estimate: str = "hessian",
+        hmin: Length | None = None,
+        hmax: Length | None = None,
+        hgrad: float | None = None,
+        change: float = 1.25,
+        dry_run: bool = False,
+        progress: bool | Progress | None = None,
+    ) -> dict[str, Any]:
+        """Meshes sub-domains again with the lengths that are best for a field at vertices. The surface and interfaces stay. Verifies.
+
+        Parameters
+        ----------
+        field : str
+            Its name, or that of a component, such as `u.x`; of type `f32` or `f64`.
+        tets : int, optional
+            Wanted number of tetrahedra.
+        factor : float, optional
+            The same as a multiple of those there are; without both, as many.
+        estimate : str
+            `hessian` for the least error of values, `jump` for that of gradients.
+        hmin, hmax, hgrad : optional
+            Least and greatest length, and their gradation.
+        change : float
+            Ratio of two lengths above which they differ. Sub-domains with other lengths in more than a twentieth are meshed again.
+        dry_run : bool
+            Only says what would change.
+
+        Returns
+        -------
+        dict
+            `tets`, `wanted_tets`, `predicted_tets`, `sizes`, `subdomains`, and the triangles of `surface` and `interfaces` that are longer than
+            wanted, which stay.
+        """
+        if estimate not in ("hessian", "jump"):
+            raise _options.usage(f"{estimate!r} is no estimate: expected 'hessian' or 'jump'", "estimate")
+        if tets is not None and factor is not None:
+            raise _options.usage("a number of tetrahedra, or a factor, not both", "tets")
+        if tets is not None and not 0 < tets < 2**63:
+            raise _sizes.bad_size(f"{tets} tetrahedra make no sense, expected one or more", "tets")
+        job = {
+            "field": field,
+            "tets": None if tets is None else int(tets),
+            "factor": None if factor is None else _sizes.numbers(factor, 1, "factor")[0],
+            "estimate": estimate,
+            "sizes": _sizes.words(None, None, hmin, hmax, hgrad, None),
+            "change": _sizes.numbers(change, 1, "change")[0],
+            "dry_run": bool(dry_run),
+        }
+        said = "{}"
+
+        def work() -> None:
+            nonlocal said
+            said = self._native.adapt(job, _options.listener(progress))
+
+        self._changed(work)
+        return dict(json.loads(said))
+
     def transfer(
         self,
         other: Store,
