@@ -142,7 +142,7 @@ fn print_at(path: &Path, settings: &Settings, console: &Console) -> Result<(), F
 
 /// Prints the bytes of each part of the store.
 fn print_bytes(info: &StoreInfo, console: &Console) {
-    if info.n_previous > 0 {
+    if info.n_previous > 0 || info.previous_bytes > 0 {
         console.line(&format!(
             "previous version of {}, for `tetdb resaturate --undo`: {}",
             count(info.n_previous as u64, "sub-domain"),

@@ -1,4 +1,4 @@
-//! An adaptive loop: `cargo run --release --example adaptive -- part.tetdb`.
+//! An adaptive loop: `cargo run --release --example adaptive -- box.tetdb`, a store of the unit cube such as of `sample:box`.
 //!
 //! A known function with a steep front stands for a solution. Each round keeps it as a field and adapts the mesh to it. The error of its
 //! interpolation ends below that of a uniform mesh of as many tetrahedra; `Store::undo` would bring back the last mesh.

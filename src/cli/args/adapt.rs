@@ -53,11 +53,12 @@ pub struct AdaptArgs {
 
 /// Reads a number with k, M or G for thousands, millions and billions behind it.
 fn number_of(text: &str) -> Result<u64, String> {
-    let (digits, unit) = match text.trim().strip_suffix(['k', 'M', 'G']) {
+    let text = text.trim();
+    let (digits, unit) = match text.strip_suffix(['k', 'M', 'G']) {
         Some(digits) if text.ends_with('k') => (digits, 1e3),
         Some(digits) if text.ends_with('M') => (digits, 1e6),
         Some(digits) => (digits, 1e9),
-        None => (text.trim(), 1.0),
+        None => (text, 1.0),
     };
     match digits.parse::<f64>().map(|x| x * unit) {
         Ok(n) if (1.0..1e15).contains(&n) => Ok(n.round() as u64),

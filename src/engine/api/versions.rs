@@ -15,6 +15,8 @@ use tetdb_store::store::{BEFORE, Catalog};
 
 /// Most versions of a store. Each change reads the lists of all.
 const VERSIONS_MAX: usize = 1000;
+/// Most sub-domains of all versions together, for the same reason.
+const SUBDOMAINS_MAX: usize = 100_000;
 /// Most characters of a name.
 const NAME_MAX: usize = 64;
 /// The word for the store as it is, which names no version.
@@ -94,6 +96,7 @@ impl Store {
     /// assert_eq!(fine.versions()?[0].digest, before);
     /// assert_eq!(tetdb::Store::open_version(&path, "coarse")?.summary().digest, before);
     /// assert!(fine.diff_versions("coarse", "now")?.subdomains[0].changed);
+    /// assert!(tetdb::Store::open_version(&path, "coarse")?.diff_versions("coarse", "now")?.subdomains[0].changed);
     /// let mut store = fine.restore_version("coarse", true)?.store;
     /// assert_eq!(store.summary().digest, before);
     /// store.drop_version("coarse")?;
@@ -101,7 +104,7 @@ impl Store {
     /// ```
     pub fn versions(&self) -> Result<Vec<Version>, Error> {
         guarded(self.settings(), || {
-            let mut catalog = self.catalog_shared();
+            let mut catalog = self.catalog_shared().now();
             let kept = kept(&mut catalog)?;
             let list = named(&mut catalog)?.into_iter();
             list.map(|(number, row)| shown(&catalog, number, row, &kept)).collect()
@@ -125,7 +128,8 @@ impl Store {
             let excess = (others.len() + 1).saturating_sub(keep.unwrap_or(usize::MAX).max(1));
             let number = others.last().map_or(BEFORE, |last| last.0) + 1;
             let dropped: Vec<_> = others.drain(..excess).collect();
-            if others.len() >= VERSIONS_MAX {
+            let n_subdomains = catalog.subdomains()?.len().max(1);
+            if others.len() >= VERSIONS_MAX.min(SUBDOMAINS_MAX / n_subdomains).max(1) {
                 let message =
                     format!("the store has {} versions, the most it can have", others.len());
                 return Err(bad(message).with_help("drop one first, or keep fewer"));
@@ -172,7 +176,7 @@ impl Store {
         let settings = self.settings();
         guarded(settings, || {
             let open = |name: &str| -> Result<_, Error> {
-                let mut catalog = self.catalog_shared();
+                let mut catalog = self.catalog_shared().now();
                 if name != NOW {
                     catalog = catalog.version_called(name).map(|(_, row)| catalog.at(&row))?;
                 }

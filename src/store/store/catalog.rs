@@ -164,6 +164,11 @@ impl Catalog {
         }
     }
 
+    /// Returns a reader of the same state of the store as it is, whatever version this one reads.
+    pub fn now(&self) -> Self {
+        Self { version: None, ..self.share() }
+    }
+
     /// Returns a reader of the same state of the store, at a version.
     pub fn at(&self, version: &VersionRow) -> Self {
         let rows = version.rows.iter().map(|&[key, copy]| (key, copy));

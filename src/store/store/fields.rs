@@ -74,7 +74,10 @@ impl Catalog {
     /// The numbers of a new field, and of the first of its files.
     pub fn next_field(&mut self) -> Result<(u32, u32), StoreError> {
         let fields: Vec<FieldRow> = self.everywhere(RowKind::Field)?;
-        let id = fields.iter().map(|field| field.id + 1).max().unwrap_or(1);
+        // Stores from before versions may have values of a field that is gone.
+        let previous: Vec<FieldPart> = self.rows(RowKind::PreviousFieldPart)?;
+        let ids = fields.iter().map(|field| field.id).chain(previous.iter().map(|part| part.field));
+        let id = ids.max().unwrap_or(0) + 1;
         // The journal grows with each step, so that no number comes back soon.
         let steps = self.journal()?.len() as u32;
         let used = self.field_files()?.iter().map(|file| file.generation + 1).max();

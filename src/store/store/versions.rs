@@ -22,6 +22,13 @@ pub struct NewVersion {
     copies: BTreeMap<u64, Vec<u8>>,
 }
 
+impl NewVersion {
+    /// Bytes of the copies.
+    pub fn bytes(&self) -> u64 {
+        self.copies.values().map(|content| content.len() as u64).sum()
+    }
+}
+
 /// The rows and files that differ between the store as it is and a version.
 pub struct Difference {
     rows: Vec<(u64, Option<Vec<u8>>)>,
@@ -268,9 +275,10 @@ impl Catalog {
             }
         }
         let rows = rows.into_iter().map(|(key, place)| [key, place]).collect();
-        let version = VersionRow { rows, ..VersionRow::default() };
-        let (meshes, fields) = self.at(&version).named_files()?;
-        Ok(Some(VersionRow { meshes, fields, ..version }))
+        // Files that rows of now name need no second owner.
+        let meshes = changed.iter().map(SubdomainRow::file).collect();
+        let fields = parts.iter().map(FieldPart::file).collect();
+        Ok(Some(VersionRow { rows, meshes, fields, ..VersionRow::default() }))
     }
 }
 

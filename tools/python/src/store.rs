@@ -440,13 +440,17 @@ impl Store {
         &self,
         py: Python<'_>,
         path: PathBuf,
+        version: Option<&str>,
         names: Vec<String>,
         method: Option<&str>,
     ) -> PyResult<String> {
         let method = method.and_then(TransferMethod::from_word);
         let mut said = String::new();
         self.changed(py, None, |mut store| {
-            let from = tetdb::Store::open(&path)?;
+            let from = match version {
+                Some(name) => tetdb::Store::open_version(&path, name)?,
+                None => tetdb::Store::open(&path)?,
+            };
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             said = json!(store.transfer_from(&from, &names, method)?).to_string();
             Ok(())

@@ -49,12 +49,14 @@ sort_record! {
 }
 
 impl ErrorEstimate {
-    /// Relative lengths at nodes, infinite where none is wanted; `None` where the field is linear but for rounding.
+    /// Relative lengths at nodes, infinite where none is wanted; `None` where the field is linear but for rounding: values have the relative
+    /// precision `epsilon`.
     ///
     /// Errors: the disk.
     pub fn relative_sizes(
         self,
         mesh: &mut MeshArrays,
+        epsilon: f64,
         scratch: &ScratchSpace,
     ) -> Result<Option<SpillVec<f64>>, PipelineError> {
         let (mut curvature, exponent) = match self {
@@ -70,8 +72,8 @@ impl ErrorEstimate {
             most = most.max(curvature.get(v) * h * h);
             range = [range[0].min(value), range[1].max(value)];
         }
-        let scale = (range[1] - range[0]).max(f64::EPSILON * range[0].abs().max(range[1].abs()));
-        if most <= ROUNDING * scale {
+        let greatest = range[0].abs().max(range[1].abs());
+        if most <= (ROUNDING * (range[1] - range[0])).max(16.0 * epsilon * greatest) {
             return Ok(None);
         }
         for v in 0..mesh.n_nodes() {
@@ -94,7 +96,8 @@ fn gradients([a, b, c, d]: [Point; 4]) -> ([Point; 4], f64) {
 /// The gradient of the field in a tetrahedron, times its volume, with what [`gradients`] returns.
 fn gradient(mesh: &mut MeshArrays, tet: [u32; 4]) -> (Point, [Point; 4], f64) {
     let (of, volume) = gradients(mesh.corners(tet));
-    let slope = tet.iter().zip(of).map(|(&v, g)| g * mesh.values.get(v as usize)).sum();
+    let [first, values @ ..] = tet.map(|v| mesh.values.get(v as usize));
+    let slope = values.iter().zip(&of[1..]).map(|(value, &g)| g * (value - first)).sum();
     (slope, of, volume)
 }
 
@@ -117,6 +120,9 @@ fn curvature_of_gradients(mesh: &mut MeshArrays, scratch: &ScratchSpace) -> Spil
         let mut sum = [0.0; 6];
         for (v, g) in tet.into_iter().zip(of) {
             let [x, y, z, volume] = slopes.get(v as usize);
+            if volume <= 0.0 {
+                continue;
+            }
             let s = Point::new(x, y, z) / volume;
             let mixed = |a: usize, b: usize| 0.5 * (s[a] * g[b] + s[b] * g[a]);
             let own = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)].map(|(a, b)| mixed(a, b));
@@ -128,8 +134,9 @@ fn curvature_of_gradients(mesh: &mut MeshArrays, scratch: &ScratchSpace) -> Spil
     for v in 0..n {
         let volume = slopes.get(v)[3];
         // A vertex may be in no tetrahedron.
-        if volume > 0.0 {
-            curvature.set(v, greatest_eigenvalue(second.get(v).map(|x| x / volume)));
+        let greatest = greatest_eigenvalue(second.get(v).map(|x| x / volume));
+        if volume > 0.0 && greatest.is_finite() {
+            curvature.set(v, greatest);
         }
     }
     drop((slopes, second));
@@ -289,7 +296,9 @@ mod tests {
                     true => (-p.x / E).exp(),
                     false => p.x * p.x + p.y * p.y - 2.0 * p.z * p.z,
                 });
-                let sizes = estimate.relative_sizes(&mut mesh, &scratch).expect("memory alone");
+                let sizes = estimate
+                    .relative_sizes(&mut mesh, f64::EPSILON, &scratch)
+                    .expect("memory alone");
                 let mut sizes = sizes.expect("a field that bends");
                 let at = |x: usize| x + 10 * 21 + 10 * 21 * 21;
                 for x in 4..17 {
@@ -298,9 +307,15 @@ mod tests {
                     assert!((ratio / growth.exp() - 1.0).abs() < 0.01, "{estimate:?} {x}: {ratio}");
                 }
             }
-            let mut linear = grid(4, |p| 300.0 + p.x - 2.0 * p.y);
-            let sizes = estimate.relative_sizes(&mut linear, &scratch).expect("memory alone");
-            assert!(sizes.is_none());
+            for (offset, is_short) in [(300.0, false), (1e6, false), (3.0, true)] {
+                let mut linear = grid(4, |p| match offset + p.x - 2.0 * p.y {
+                    value if is_short => f64::from(value as f32),
+                    value => value,
+                });
+                let epsilon = if is_short { f64::from(f32::EPSILON) } else { f64::EPSILON };
+                let sizes = estimate.relative_sizes(&mut linear, epsilon, &scratch);
+                assert!(sizes.expect("memory alone").is_none(), "{offset} {estimate:?}");
+            }
         }
     }
 

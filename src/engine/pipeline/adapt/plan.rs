@@ -9,7 +9,7 @@ use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use crate::pipeline::remesh::{NewSizes, Values, room};
 use tetdb_base::storage::{Budget, attempt};
-use tetdb_schema::field::FieldRow;
+use tetdb_schema::field::{FieldNumber, FieldRow};
 use tetdb_store::store::Catalog;
 
 /// A sub-domain is meshed again when more than this share of its load has other lengths. Meshing it takes as long for one changed
@@ -106,7 +106,12 @@ pub fn plan_adaptation(
     attempt(|| {
         let field = (&request.field, request.component);
         let mut mesh = MeshArrays::read(catalog, options, field, &scratch, memory)?;
-        let Some(relative) = request.estimate.relative_sizes(&mut mesh, &scratch)? else {
+        let epsilon = match request.field.number {
+            FieldNumber::F32 => f64::from(f32::EPSILON),
+            _ => f64::EPSILON,
+        };
+        let relative = request.estimate.relative_sizes(&mut mesh, epsilon, &scratch)?;
+        let Some(relative) = relative else {
             return Ok(None);
         };
         let limits = SizeLimits { range: request.limits, beta: request.beta };

@@ -24,6 +24,8 @@ use tetdb_kernel::mesh::Workspace;
 use tetdb_kernel::sizing::{BackgroundMesh, SizeField};
 use tetdb_schema::blob::{Blob, BlobContent};
 use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow, VersionRow};
+use tetdb_schema::field::FieldPart;
+use tetdb_schema::row::RowKind;
 use tetdb_schema::topology::FaceOwners;
 use tetdb_schema::tree::SubtreeMesh;
 use tetdb_store::sealed::SealedError;
@@ -295,12 +297,18 @@ impl<'a> RemeshRun<'a> {
             // Interface faces stay under any sizes, and a repair must restore the whole sub-domain. Otherwise the coarse snapshot
             // is a different one.
             let has_other_faces = sealed.row.interface_digest != row.interface_digest;
-            let is_same = sealed.row.digest == row.digest && sealed.row.chunks == row.chunks;
+            let has_other_chunks = sealed.row.chunks != row.chunks;
+            let is_same = sealed.row.digest == row.digest
+                && !(has_other_chunks && has_values(self.catalog, row)?);
             if has_other_faces || self.what.repair && !is_same {
                 return Err(StoreError::Sealed(SealedError::Content {
                     path: self.catalog.dir().to_owned(),
                     subdomain: rank,
-                    what: "meshed again, it is not what the catalog says it was".to_owned(),
+                    what: match sealed.row.digest == row.digest {
+                        true => "meshed again, it is packed otherwise than the values of its fields; drop the fields and versions with them first",
+                        false => "meshed again, it is not what the catalog says it was",
+                    }
+                    .to_owned(),
                 })
                 .into());
             }
@@ -321,6 +329,9 @@ impl<'a> RemeshRun<'a> {
             true => self.catalog.versions_with(&changed)?,
             false => vec![(BEFORE, self.catalog.version_now(VersionRow::default())?)],
         };
+        // The step holds copies of these.
+        let copies: u64 = versions.iter().map(|(_, new)| 2 * new.bytes()).sum();
+        let memory = memory.saturating_sub(copies);
         let fields = match (self.what.drop_fields, self.what.repair) {
             (true, _) => FieldChanges::drop_all(self.catalog)?,
             (false, true) => FieldChanges::keep(self.catalog, &changed)?,
@@ -420,4 +431,10 @@ pub fn recorded_field(
     let diagonal = tree::bounds(catalog)?.diagonal();
     let field = SizeField::from_bytes_in(&bytes, room)?;
     Ok(field.with_sources(&options.mesh.sizes, diagonal)?)
+}
+
+/// Returns whether fields have values on this mesh, now or in a version. They lie as its chunks do.
+fn has_values(catalog: &mut Catalog, row: &SubdomainRow) -> Result<bool, StoreError> {
+    let parts: Vec<FieldPart> = catalog.everywhere(RowKind::FieldPart)?;
+    Ok(parts.iter().any(|part| (part.rank, part.generation) == (row.rank, row.generation)))
 }

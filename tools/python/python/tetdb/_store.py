@@ -816,7 +816,7 @@ class Store:
 
         def work() -> None:
             nonlocal said
-            said = self._native.transfer(other.path, names, method)
+            said = self._native.transfer(other.path, other._how["version"], names, method)
 
         self._changed(work)
         return list(json.loads(said))
