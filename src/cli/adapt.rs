@@ -65,7 +65,9 @@ fn print(plan: &AdaptPlan, console: &Console) {
         ));
     }
     let kept = (plan.subdomains.len() - changed.len()) as u64;
-    console.line(&format!("{} kept as it is", count(kept, "sub-domain")));
+    if kept > 0 {
+        console.line(&format!("{} unchanged", count(kept, "sub-domain")));
+    }
     for (what, faces) in
         [("surface triangle", &plan.surface), ("interface triangle", &plan.interfaces)]
     {
