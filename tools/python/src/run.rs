@@ -31,7 +31,7 @@ pub struct JobWords<'py> {
 }
 
 /// How it is done.
-#[derive(FromPyObject, Clone, Copy, Default)]
+#[derive(FromPyObject, Clone, Default)]
 #[pyo3(from_item_all)]
 pub struct SettingWords {
     pub memory: Option<u64>,
@@ -41,7 +41,7 @@ pub struct SettingWords {
 }
 
 impl SettingWords {
-    pub fn settings(self, token: &CancelToken, board: Option<&Arc<Board>>) -> Settings {
+    pub fn settings(&self, token: &CancelToken, board: Option<&Arc<Board>>) -> Settings {
         let mut settings = Settings::new().cancel(token);
         if let Some(bytes) = self.memory {
             settings = settings.memory(Bytes(bytes));
@@ -49,7 +49,7 @@ impl SettingWords {
         if let Some(n) = self.threads {
             settings = settings.threads(n);
         }
-        if let Some(name) = self.version {
+        if let Some(name) = &self.version {
             settings = settings.at_version(name);
         }
         match board {

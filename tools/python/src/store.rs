@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use serde_json::json;
 use tetdb::data::Hit;
 use tetdb::{
-    CancelToken, ColorBy, ErrorEstimate, ExportOptions, FieldIds, FieldPlace, FieldSource, NewField, Order,
-    Snapshot, TransferMethod, VerifyLevel, Word,
+    CancelToken, ColorBy, ErrorEstimate, ExportOptions, FieldIds, FieldPlace, FieldSource,
+    NewField, Order, Snapshot, TransferMethod, VerifyLevel, Word,
 };
 
 use crate::failure::Failure;
