@@ -61,9 +61,9 @@ enum AdaptTarget {
 /// A mesh that was adapted to a field.
 #[non_exhaustive]
 pub struct Adapted {
-    /// What was to be changed.
+    /// The plan, as [`Adapt::plan`] returns it.
     pub plan: AdaptPlan,
-    /// What was changed.
+    /// The store after the change, and its sub-domains before and after.
     pub remeshed: Remeshed,
 }
 

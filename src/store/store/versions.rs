@@ -113,7 +113,7 @@ impl Catalog {
         Ok(new)
     }
 
-    /// What [`Step::restore`] changes. Errors: damage.
+    /// The rows and files that [`Step::restore`] changes. Errors: damage.
     pub fn difference(&mut self, version: &VersionRow) -> Result<Difference, StoreError> {
         let mut then = self.at(version);
         let mut keys: BTreeSet<u64> = self.versioned_keys()?.into_iter().collect();

@@ -85,7 +85,7 @@ struct RemeshWords<'py> {
     repair: bool,
 }
 
-/// What a mesh is adapted to.
+/// The arguments of `adapt`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct AdaptWords<'py> {

@@ -16,7 +16,7 @@ use tetdb_store::store::Catalog;
 /// tetrahedron as for all; below a twentieth the error hardly changes.
 const CHANGED_SHARE: f64 = 0.05;
 
-/// What a mesh is adapted to.
+/// A request to adapt a mesh: a field, a number of tetrahedra, limits of lengths.
 #[derive(Clone, Debug)]
 pub struct AdaptRequest {
     /// A field at vertices, of numbers that are no integers and are all finite.
@@ -48,7 +48,7 @@ pub struct AdaptForecast {
     pub predicted_tets: f64,
     /// Share of its load where lengths change.
     pub changed_share: f64,
-    /// Whether it is meshed again.
+    /// True if it is meshed again.
     pub is_changed: bool,
 }
 
@@ -64,7 +64,7 @@ pub struct LongFaces {
     pub greatest_ratio: f64,
 }
 
-/// What adapting a mesh changes.
+/// The sub-domains that an adaptation meshes again, and the tetrahedra and lengths to expect.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct AdaptPlan {
@@ -91,7 +91,7 @@ impl AdaptPlan {
     }
 }
 
-/// What a request changes, and the sizes with which its sub-domains are to be meshed; `None` where the field is linear but for rounding.
+/// Finds the sub-domains to mesh again and the sizes for them; `None` where the field is linear but for rounding.
 ///
 /// Half of the free memory is used at most. Errors: damage; the disk; too little memory.
 pub fn plan_adaptation(
