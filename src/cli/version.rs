@@ -8,7 +8,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::words::{count, worst};
-use tetdb_engine::api::{Code, Store, Version, VersionDiff};
+use tetdb_engine::api::{Store, Version, VersionDiff};
 
 pub fn run(args: &VersionArgs, console: &Console) -> Result<u8, Failure> {
     let settings = console.settings(memory::requested(args.read().memory.as_deref())?, None);
@@ -30,13 +30,7 @@ pub fn run(args: &VersionArgs, console: &Console) -> Result<u8, Failure> {
             (json!({ "schema": 1, "versions": versions }), Vec::new())
         }
         VersionAction::Show(args) => {
-            let mut found = store.versions()?.into_iter().filter(|v| v.name == args.name);
-            let Some(version) = found.next() else {
-                let message = format!("there is no version {}", args.name);
-                return Err(
-                    Failure::new(Code::NoSuchPart, message).help("`tetdb version STORE list`")
-                );
-            };
+            let version = store.version(&args.name)?;
             print(&version, console);
             if !console.is_json() && !version.fields.is_empty() {
                 console.line(&format!("  fields {}", version.fields.join(", ")));

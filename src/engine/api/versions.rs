@@ -111,6 +111,15 @@ impl Store {
         })
     }
 
+    /// The version of this name. Errors: `no-such-part`; damage.
+    pub fn version(&self, name: &str) -> Result<Version, Error> {
+        guarded(self.settings(), || {
+            let mut catalog = self.catalog_shared().now();
+            let ((number, row), kept) = (catalog.version_called(name)?, kept(&mut catalog)?);
+            shown(&catalog, number, row, &kept)
+        })
+    }
+
     /// Saves the store as it is as a version, in one step. No file is copied: a version keeps files from being removed.
     ///
     /// With `keep`, the oldest versions beyond that number are dropped. Returns their names. Errors: `bad-version` for a name that is taken, or

@@ -86,3 +86,28 @@ def test_meshes_adapt_to_fields(tmp_path: Path) -> None:
                 st.adapt("u", **bad)
         with pytest.raises(tetdb.TetdbError):
             st.adapt("nothing", factor=1.0)
+
+
+def test_versions_are_read_and_fields_come_from_them(tmp_path: Path) -> None:
+    path = tmp_path / "box.tetdb"
+    with tetdb.mesh(tetdb.sample("box,h=0.2"), path) as st:
+        st.fields.add("u", "x")
+        assert st.save_version("first", "with u") == []
+        del st.fields["u"]
+        st.fields.add("v", "y")
+        before = st.n_tets
+        st.resaturate(0, scale=0.7)
+        assert st.diff_versions("first")["subdomains"][0]["tets"] == [before, st.n_tets]
+        assert [version["name"] for version in st.versions()] == ["first"]
+        with tetdb.open(path, version="first") as old:
+            assert (old.n_tets, list(old.fields)) == (before, ["u"])
+            assert not old.diff_versions("first")["same"]
+            with pytest.raises(tetdb.TetdbError):
+                old.fields.add("w", "z")
+            with tetdb.mesh(tetdb.sample("box,h=0.25"), tmp_path / "other.tetdb") as other:
+                other.transfer(old)
+                assert list(other.fields) == ["u"]
+        st.restore_version("first")
+        assert (st.n_tets, list(st.fields)) == (before, ["u"])
+        st.drop_version("first")
+        assert st.versions() == []
