@@ -1,6 +1,7 @@
 //! Conversions of the errors of lower modules into [`Error`].
 
 use super::error::{Error, Remedy};
+use super::preflight::no_room;
 use crate::pipeline::PipelineError;
 use tetdb_base::storage::StorageError;
 use tetdb_base::surface::{SurfaceError, show};
@@ -188,6 +189,7 @@ impl From<PipelineError> for Error {
             PipelineError::Store(e) => e.into(),
             PipelineError::Storage(e) => e.into(),
             PipelineError::Query(e) => e.into(),
+            PipelineError::NoRoom { tets, needed, free } => no_room(tets, needed, free),
             PipelineError::LaterFields { .. } => Self::new(Code::BadField, &e)
                 .with_help("drop these fields first, and add them again afterwards"),
             PipelineError::NothingFilled { .. } => Self::new(Code::NothingFilled, &e)

@@ -5,13 +5,10 @@ use tetdb_schema::code::Code;
 
 use super::error::{Error, Remedy};
 use super::{Settings, show_bytes};
-use crate::pipeline::{self, Estimate};
+use crate::pipeline::{self, Estimate, REFUSED_BELOW};
 use tetdb_base::geom::short;
 use tetdb_base::storage::{ScratchSpace, available_bytes, n_threads};
 use tetdb_base::surface::Surface;
-
-/// A mesh is refused if less than this share of its predicted disk space is free. Predictions may be off by that much.
-const REFUSED_BELOW: f64 = 0.7;
 
 /// The part of `cap` that a surface leaves free, with scratch files in the folder that holds the store.
 pub fn scratch_beside(surface: &Surface, cap: u64, store: &Path) -> Result<ScratchSpace, Error> {
@@ -55,16 +52,7 @@ pub fn preflight(
     };
     let needed = estimate.disk_peak_bytes(cap, n_threads());
     if (free as f64) < REFUSED_BELOW * needed as f64 {
-        let message = format!(
-            "about {} tetrahedra are expected, which need {} of disk on the way; {} are free",
-            short(estimate.tets().round()),
-            show_bytes(needed),
-            show_bytes(free)
-        );
-        return Err(Error::new(Code::NoRoom, message)
-            .at(store.display())
-            .with_help("ask for longer edges, allow more memory, or put the store on another disk")
-            .with_remedy(Remedy::General));
+        return Err(no_room(estimate.tets(), needed, free).at(store.display()));
     }
     if free < needed {
         settings.warn(format!(
@@ -74,6 +62,19 @@ pub fn preflight(
         ));
     }
     Ok(())
+}
+
+/// The error of a disk that is not expected to hold `tets` tetrahedra.
+pub fn no_room(tets: f64, needed: u64, free: u64) -> Error {
+    let message = format!(
+        "about {} tetrahedra are expected, which need {} of disk on the way; {} are free",
+        short(tets.round()),
+        show_bytes(needed),
+        show_bytes(free)
+    );
+    Error::new(Code::NoRoom, message)
+        .with_help("ask for longer edges, allow more memory, or put the store on another disk")
+        .with_remedy(Remedy::General)
 }
 
 /// Adds the free disk space to an error of a full disk. With `needed`, the predicted bytes of the whole run, also adds the bytes

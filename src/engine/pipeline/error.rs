@@ -38,6 +38,18 @@ pub enum PipelineError {
     /// Pages could not be read, written or held.
     #[error(transparent)]
     Storage(#[from] StorageError),
+    /// The disk has less room than the mesh is expected to need.
+    #[error(
+        "about {tets:.0} tetrahedra are expected, which need {needed} bytes of disk on the way; {free} are free"
+    )]
+    NoRoom {
+        /// Predicted tetrahedra.
+        tets: f64,
+        /// Predicted bytes.
+        needed: u64,
+        /// Bytes that the system reports as free.
+        free: u64,
+    },
     /// The value of an option is not recognized.
     #[error("{option} '{value}' is not known")]
     Option {

@@ -37,8 +37,8 @@ pub use mesh::coarse_mesh;
 pub use mesh::{CoarseReport, HeadStart, Summary, head_start, mesh, mesh_prepared};
 pub use plan::{
     EmbedOutside, Estimate, MEMORY_MIN, MeshOptions, Options, OptionsText, OuterEmbedded, Plan,
-    Prepared, RECIPE, RunOptions, SizeFile, Subdomains, Trial, least_for, outer_embedded, prepare,
-    recipe_of, record_recipe, refuse_outer,
+    Prepared, RECIPE, REFUSED_BELOW, RunOptions, SizeFile, Subdomains, Trial, least_for,
+    outer_embedded, prepare, recipe_of, record_recipe, refuse_outer,
 };
 pub use progress::silent;
 pub use progress::{Event, Watcher};

@@ -36,6 +36,8 @@ const PREPARE_LEAST: usize = 16 << 20;
 const UNOPTIMIZED: f64 = 1.078;
 const DELAUNAY: f64 = 1.025;
 
+/// A mesh is refused if less than this share of its predicted disk space is free. Predictions may be off by that much.
+pub const REFUSED_BELOW: f64 = 0.7;
 /// Bytes of a sealed sub-domain per tetrahedron, vertex and facet; the sums are within 6 % on seven surfaces.
 const SEALED_TET: f64 = 2.74;
 const SEALED_VERTEX: f64 = 22.1;

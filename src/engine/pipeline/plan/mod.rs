@@ -11,7 +11,7 @@ mod recipe;
 mod regions;
 pub(super) mod subdomains;
 
-pub use estimate::{Estimate, Prepared, least_for, prepare};
+pub use estimate::{Estimate, Prepared, REFUSED_BELOW, least_for, prepare};
 pub use memory::{MEMORY_MIN, Plan};
 pub use option_text::OptionsText;
 pub use options::{EmbedOutside, MeshOptions, Options, RunOptions, SizeFile, Subdomains, Trial};

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use super::request::Resaturation;
 use super::run::{RemeshRun, recorded_field, room};
-use super::sizes::{NewSizes, Recorded, predicted};
+use super::sizes::{NewSizes, Recorded};
 use super::summary::ResaturateSummary;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
@@ -55,20 +55,8 @@ pub fn forecast(
 ) -> Result<Vec<Forecast>, PipelineError> {
     let mut again = RemeshRun::open(catalog, options, what, budget)?;
     attempt(|| {
-        let memory = budget.available() / 4;
-        let mut list = Vec::new();
-        for (rank, new) in again.fields(budget)? {
-            let recorded = Recorded { whole: &again.field, room: &room(again.catalog, budget)? };
-            let old = recorded.own(again.catalog, rank)?;
-            let old = old.as_ref().unwrap_or(&again.field);
-            let tets = again.catalog.subdomain(rank)?.tets;
-            let predicted = match &new {
-                Some(new) => predicted(again.catalog, rank, [old, new], memory)?,
-                None => tets as f64,
-            };
-            list.push(Forecast { rank, tets, predicted });
-        }
-        Ok(list)
+        let fields = again.fields(budget)?;
+        again.forecast(&fields, budget)
     })?
 }
 

@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use super::fields::FieldChanges;
 use super::request::Resaturation;
-use super::sizes::{Recorded, Values};
+use super::resaturate::Forecast;
+use super::sizes::{Recorded, Values, predicted};
 use super::summary::{ResaturateSummary, Resaturated};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::plan::{Options, Plan};
+use crate::pipeline::plan::{Options, Plan, REFUSED_BELOW};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::{journal, sum_totals, totals_of};
 use crate::pipeline::tree::{self, read_blob};
@@ -19,7 +20,7 @@ use crate::pipeline::work::soundness::{check_owners, panic_is_damage_of};
 use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::workers::{WorkerFn, map_bounded};
 use tetdb_base::geom::{Aabb, Point};
-use tetdb_base::storage::{Backing, Budget, DiskPath, ScratchSpace, attempt};
+use tetdb_base::storage::{Backing, Budget, DiskPath, ScratchSpace, attempt, available_bytes};
 use tetdb_kernel::mesh::Workspace;
 use tetdb_kernel::sizing::{BackgroundMesh, SizeField};
 use tetdb_schema::blob::{Blob, BlobContent};
@@ -197,12 +198,54 @@ impl<'a> RemeshRun<'a> {
         }
     }
 
+    /// Predicts the numbers of tetrahedra with these fields.
+    pub fn forecast(
+        &mut self,
+        fields: &BTreeMap<u32, Option<SizeField>>,
+        budget: &Budget,
+    ) -> Result<Vec<Forecast>, PipelineError> {
+        let room = room(self.catalog, budget)?;
+        let recorded = Recorded { whole: &self.field, room: &room };
+        let memory = budget.available() / 4;
+        let mut list = Vec::new();
+        for (row, _) in &self.rows {
+            let predicted = match (&self.what.sizes, &fields[&row.rank]) {
+                (Some(_), Some(new)) => {
+                    let old = recorded.own(self.catalog, row.rank)?;
+                    let old = old.as_ref().unwrap_or(&self.field);
+                    predicted(self.catalog, row.rank, [old, new], memory)?
+                }
+                _ => row.tets as f64,
+            };
+            list.push(Forecast { rank: row.rank, tets: row.tets, predicted });
+        }
+        Ok(list)
+    }
+
+    /// Refuses new files that the disk is not expected to hold; the old ones stay until the commit, and as a version after it.
+    fn check_disk(&self, forecast: &[Forecast]) -> Result<(), PipelineError> {
+        let of = |((row, _), new): (&(SubdomainRow, CoarseRow), &Forecast)| {
+            row.bytes as f64 * new.predicted / row.tets.max(1) as f64
+        };
+        let needed: f64 = self.rows.iter().zip(forecast).map(of).sum();
+        match available_bytes(self.catalog.dir()) {
+            Some(free) if (free as f64) < REFUSED_BELOW * needed => Err(PipelineError::NoRoom {
+                tets: forecast.iter().map(|new| new.predicted).sum(),
+                needed: needed as u64,
+                free,
+            }),
+            _ => Ok(()),
+        }
+    }
+
     pub fn run(
         &mut self,
         fields: BTreeMap<u32, Option<SizeField>>,
         budget: &Budget,
         watch: &Watcher,
     ) -> Result<ResaturateSummary, PipelineError> {
+        let forecast = self.forecast(&fields, budget)?;
+        self.check_disk(&forecast)?;
         let of = |field: &SizeField| field.bytes() as u64;
         let own: u64 = fields.values().flatten().map(of).sum();
         let sizes = self.what.sizes.as_ref();
