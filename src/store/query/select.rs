@@ -14,6 +14,10 @@ use super::{QueryError, QuerySession};
 use crate::sealed::Subdomain;
 use tetdb_base::geom::{Aabb, IdMap, Point};
 
+/// Chunks one after the other that belong to the same share. Of shorter runs, both shares need the vertices; of longer ones, one
+/// waits for the other.
+const SHARED_RUN: usize = 4;
+
 /// The answers to [`QuerySession::select`]; holds one chunk's at a time. Ends after the first error.
 pub struct Selected<'a> {
     session: &'a mut QuerySession,
@@ -110,6 +114,10 @@ impl Selected<'_> {
             {
                 chunks.push(chunk);
             }
+        }
+        if let Some([number, of]) = self.selection.share {
+            let mut runs = (0..chunks.len()).map(|place| place / SHARED_RUN % of == number);
+            chunks.retain(|_| runs.next() == Some(true));
         }
         self.marks = marks;
         self.chunks = chunks.into_iter();

@@ -42,6 +42,8 @@ pub struct Selection {
     pub condition_extra: Vec<ExtraVariable>,
     /// Variables that the hits are to have, at most [`EXTRA_MAX`](super::EXTRA_MAX).
     pub extra: Vec<ExtraVariable>,
+    /// Only the chunks of one of several shares: its number, and how many there are.
+    pub share: Option<[usize; 2]>,
 }
 
 /// Vertices, some of which a tetrahedron must have.
