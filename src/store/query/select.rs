@@ -184,21 +184,19 @@ pub(super) fn hits_in(
         }
         keep
     })?;
-    let found = frame.tets.iter().zip(on_surface);
-    let found = found.map(|(tet, on_surface)| Hit { on_surface, ..frame.hit(tet) });
+    // Most tetrahedra of a chunk near a solid do not meet it; their shapes are not measured.
+    let found = frame.tets.iter().zip(on_surface).enumerate();
+    let found = found.filter(|(_, (tet, _))| selection.meets(&frame.corners(tet)));
+    let found = found.map(|(i, (tet, on_surface))| (i, Hit { on_surface, ..frame.hit(tet) }));
     if !needs_extra {
-        return Ok(found.filter(|found| selection.holds(found, &[])).collect());
+        let hits = found.map(|(_, hit)| hit);
+        return Ok(hits.filter(|hit| selection.holds(hit, &[])).collect());
     }
     let of_condition = session.extra_values(rank, &selection.condition_extra, &kept)?;
     let n = selection.condition_extra.len();
-    let mut place = 0..kept.len();
     let (mut hits, tets): (Vec<Hit>, Vec<(u32, SealedTet)>) = found
-        .zip(&kept)
-        .filter(|(hit, _)| {
-            let i = place.next().expect("a place for each");
-            selection.holds(hit, &of_condition[i * n..(i + 1) * n])
-        })
-        .map(|(hit, tet)| (hit, *tet))
+        .filter(|(i, hit)| selection.holds(hit, &of_condition[i * n..(i + 1) * n]))
+        .map(|(i, hit)| (hit, kept[i]))
         .unzip();
     let values = session.extra_values(rank, &selection.extra, &tets)?;
     for (hit, values) in hits.iter_mut().zip(values.chunks(selection.extra.len().max(1))) {

@@ -189,7 +189,7 @@ function live() {
     byId("free").hidden = form.axis.value !== "free";
     const next = plane();
     const axis = form.axis.value;
-    byId("where").textContent = next ? `${axis === "free" ? "" : "xyz"[axis] + " = "}${number(next.at)}` : "";
+    byId("at").textContent = next ? `${axis === "free" ? "" : "xyz"[axis] + " = "}${number(next.at)}` : "";
     if (!next) {
       asked.section?.abort();
       cut = null;
@@ -216,7 +216,7 @@ function live() {
   }
 
   async function find() {
-    const text = form.where.value.trim();
+    const text = byId("condition").value.trim();
     if (!text) return forget();
     say("answer", "counting …");
     try {
