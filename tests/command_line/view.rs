@@ -101,8 +101,13 @@ impl Server {
 }
 
 fn place() -> Place {
+    place_of("box,h=0.09")
+}
+
+fn place_of(sample: &str) -> Place {
     let place = Place::new();
-    place.run_line("mesh sample:box,h=0.09 -o a.tetdb --subdomains 2 --no-verify").succeeds();
+    let line = format!("mesh sample:{sample} -o a.tetdb --subdomains 2 --no-verify");
+    place.run_line(&line).succeeds();
     place.run_line("field a.tetdb add T --at vertices --from x+2*y").succeeds();
     place
 }
@@ -229,7 +234,8 @@ fn broken_and_long_requests_are_refused() {
 
 #[test]
 fn pictures_are_what_queries_find() {
-    let place = place();
+    // Enough chunks for several threads.
+    let place = place_of("balls,count=60");
     let server = Server::start(&place, "a.tetdb --threads 2");
     let single = Server::start(&place, "a.tetdb --threads 1 --memory 64MiB");
     let info = place.run_line("info a.tetdb --json").succeeds().json();

@@ -159,7 +159,8 @@ impl Viewer {
         condition: Option<&str>,
     ) -> Result<DrawnTriangles, Error> {
         let plane = line_of("a plane", plane)?;
-        let (selection, variable) = self.selection(value, condition)?;
+        let (mut selection, variable) = self.selection(value, condition)?;
+        selection.stays_decoded = true;
         self.draw(|sessions, budget| {
             let of = |hit: &Hit| Some(hit.value(variable) as f32);
             let mut scene = view::scene(sessions, budget);

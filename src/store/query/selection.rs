@@ -44,6 +44,8 @@ pub struct Selection {
     pub extra: Vec<ExtraVariable>,
     /// Only the chunks of one of several shares: its number, and how many there are.
     pub share: Option<[usize; 2]>,
+    /// True if questions about places nearby follow: chunks stay decoded where the memory is enough. Answers are the same.
+    pub stays_decoded: bool,
 }
 
 /// Vertices, some of which a tetrahedron must have.
