@@ -3,8 +3,7 @@
 use serde_json::{Value, json};
 
 use super::failure::Failure;
-use super::view_http::Answer;
-use super::view_server::random_token;
+use super::view_http::{Answer, random_token};
 use tetdb_engine::api::{
     AnswerColumn, AnswerRow, Code, DrawnTriangles, Error, PickedTet, Scalar, Viewer,
 };
@@ -118,6 +117,11 @@ impl Call {
             Some((name, _)) => Err(bad(format!("{name}: not a parameter of {path}"))),
             None => Ok(call),
         }
+    }
+
+    /// Returns whether the answer may read much of the store.
+    pub fn is_long(&self) -> bool {
+        matches!(self, Self::Boundary(_) | Self::Answers { .. })
     }
 
     /// Asks the viewer. `token`: for the page.

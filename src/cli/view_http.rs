@@ -12,6 +12,8 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Time and bytes that a refused client may still send before the connection ends, so that it reads why.
 const DRAIN: Duration = Duration::from_millis(200);
 const DRAIN_BYTES: usize = 1 << 20;
+/// Random bytes of a token, 192 bits.
+const TOKEN_BYTES: usize = 24;
 /// Header with the token.
 pub const TOKEN_HEADER: &str = "X-Tetdb-Token";
 
@@ -187,4 +189,11 @@ pub fn is_gone(stream: &TcpStream) -> bool {
         Err(e) => e.kind() == ErrorKind::WouldBlock,
     };
     stream.set_nonblocking(false).is_err() || !is_open
+}
+
+/// A random number of the system in hexadecimal digits. Errors: the system has none.
+pub fn random_token() -> std::io::Result<String> {
+    let mut bytes = [0; TOKEN_BYTES];
+    getrandom::fill(&mut bytes)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }

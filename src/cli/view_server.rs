@@ -11,15 +11,13 @@ use std::time::Duration;
 use subtle::ConstantTimeEq;
 
 use super::view_answers::Call;
-use super::view_http::{self, Answer, Request};
+use super::view_http::{self, Answer, Request, random_token};
 use tetdb_engine::api::{CancelToken, Viewer};
 
 /// Connections at a time; browsers open some ahead of their use.
 const CONNECTIONS: usize = 32;
 /// How often a waiting client is looked for.
 const LOOK: Duration = Duration::from_millis(20);
-/// Random bytes of a token, 192 bits.
-const TOKEN_BYTES: usize = 24;
 
 /// The tokens of an address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,14 +36,14 @@ struct Shared {
     token: String,
     /// `None` once it was used.
     opened: Mutex<Option<String>>,
-    jobs: Mutex<Sender<Job>>,
     n_jobs: AtomicU64,
     n_connections: AtomicUsize,
     workers: Vec<Worker>,
 }
 
-/// What a thread that answers is doing.
+/// A thread that answers: what waits for it, and what it is doing.
 struct Worker {
+    queue: Mutex<Sender<Job>>,
     job: Mutex<Option<u64>>,
     cancel: CancelToken,
 }
@@ -54,7 +52,7 @@ struct Job {
     id: u64,
     call: Call,
     /// True once nobody waits.
-    is_vain: Arc<AtomicBool>,
+    is_abandoned: Arc<AtomicBool>,
     reply: Sender<Answer>,
 }
 
@@ -64,24 +62,24 @@ impl Server {
     /// Errors: the port is taken; the system has no random numbers or threads.
     pub fn start(port: u16, viewers: Vec<(Viewer, CancelToken)>) -> Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
-        let (sender, receiver) = channel();
-        let (viewers, tokens): (Vec<_>, Vec<_>) = viewers.into_iter().unzip();
-        let worker = |cancel| Worker { job: Mutex::new(None), cancel };
+        let (mut workers, mut own) = (Vec::new(), Vec::new());
+        for (viewer, cancel) in viewers {
+            let (sender, receiver) = channel();
+            workers.push(Worker { queue: Mutex::new(sender), job: Mutex::new(None), cancel });
+            own.push((viewer, receiver));
+        }
         let shared = Arc::new(Shared {
             port: listener.local_addr()?.port(),
             token: random_token()?,
             opened: Mutex::new(Some(random_token()?)),
-            jobs: Mutex::new(sender),
             n_jobs: AtomicU64::new(0),
             n_connections: AtomicUsize::new(0),
-            workers: tokens.into_iter().map(worker).collect(),
+            workers,
         });
-        let receiver = Arc::new(Mutex::new(receiver));
-        for (number, mut viewer) in viewers.into_iter().enumerate() {
-            let (shared, receiver) = (shared.clone(), receiver.clone());
-            thread::Builder::new().name(format!("view {number}")).spawn(move || {
-                shared.workers[number].work(&mut viewer, &receiver, &shared.token)
-            })?;
+        for (number, (mut viewer, jobs)) in own.into_iter().enumerate() {
+            let shared = shared.clone();
+            let work = move || shared.workers[number].work(&mut viewer, &jobs, &shared.token);
+            thread::Builder::new().name(format!("view {number}")).spawn(work)?;
         }
         let accepting = shared.clone();
         thread::Builder::new().name("view".into()).spawn(move || accepting.accept(&listener))?;
@@ -105,16 +103,12 @@ impl Server {
 
 impl Worker {
     /// Answers one job after the other.
-    fn work(&self, viewer: &mut Viewer, jobs: &Mutex<Receiver<Job>>, token: &str) {
-        loop {
-            let next = locked(jobs).recv();
-            let Ok(Job { id, call, is_vain, reply }) = next else {
-                return;
-            };
+    fn work(&self, viewer: &mut Viewer, jobs: &Receiver<Job>, token: &str) {
+        for Job { id, call, is_abandoned, reply } in jobs {
             {
                 // Whoever gives up a job sets its mark first, then looks who is at it.
                 let mut job = locked(&self.job);
-                if is_vain.load(Ordering::SeqCst) {
+                if is_abandoned.load(Ordering::SeqCst) {
                     continue;
                 }
                 *job = Some(id);
@@ -136,11 +130,11 @@ impl Shared {
                 thread::sleep(LOOK);
                 continue;
             };
-            if self.n_connections.fetch_add(1, Ordering::SeqCst) >= CONNECTIONS {
-                self.n_connections.fetch_sub(1, Ordering::SeqCst);
-                drop(stream);
-                continue;
+            // The system keeps others waiting meanwhile.
+            while self.n_connections.load(Ordering::SeqCst) >= CONNECTIONS {
+                thread::sleep(LOOK);
             }
+            self.n_connections.fetch_add(1, Ordering::SeqCst);
             let shared = self.clone();
             let attended = thread::Builder::new().spawn(move || {
                 shared.attend(&mut stream);
@@ -197,10 +191,15 @@ impl Shared {
     fn ask(&self, call: Call, stream: &TcpStream) -> Option<Answer> {
         let id = self.n_jobs.fetch_add(1, Ordering::SeqCst);
         let (reply, replied) = channel();
-        let is_vain = Arc::new(AtomicBool::new(false));
-        let job = Job { id, call, is_vain: is_vain.clone(), reply };
+        let is_abandoned = Arc::new(AtomicBool::new(false));
+        let job = Job { id, call, is_abandoned: is_abandoned.clone(), reply };
         let ended = || Answer::refusal(503, "the server ends");
-        if locked(&self.jobs).send(job).is_err() {
+        // What is soon done waits for nothing that takes long. Sections meet the chunks that the same worker has decoded.
+        let worker = match job.call.is_long() {
+            true => self.workers.last(),
+            false => self.workers.first(),
+        };
+        if worker.is_none_or(|worker| locked(&worker.queue).send(job).is_err()) {
             return Some(ended());
         }
         loop {
@@ -208,7 +207,7 @@ impl Shared {
                 Ok(answer) => return Some(answer),
                 Err(RecvTimeoutError::Disconnected) => return Some(ended()),
                 Err(RecvTimeoutError::Timeout) if view_http::is_gone(stream) => {
-                    is_vain.store(true, Ordering::SeqCst);
+                    is_abandoned.store(true, Ordering::SeqCst);
                     for worker in &self.workers {
                         let job = locked(&worker.job);
                         if *job == Some(id) {
@@ -221,13 +220,6 @@ impl Shared {
             }
         }
     }
-}
-
-/// A random number of the system in hexadecimal digits.
-pub fn random_token() -> Result<String> {
-    let mut bytes = [0; TOKEN_BYTES];
-    getrandom::fill(&mut bytes)?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

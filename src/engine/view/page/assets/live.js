@@ -171,13 +171,10 @@ function live() {
       thinned();
     };
     say("status", "reading the surface …");
-    const all = Array.from({ length: data.shares.boundary }, (_, share) => ["boundary", share]);
-    if (several) all.push(...Array.from({ length: data.shares.interfaces }, (_, share) => ["interfaces", share]));
-    // Two at a time, as the server answers.
-    const take = async () => {
-      for (let next = all.shift(); next; next = all.shift()) await get(...next);
+    const all = async (path) => {
+      for (let share = 0; share < data.shares[path]; share++) await get(path, share);
     };
-    await Promise.all([take(), take()]);
+    await Promise.all([all("boundary"), several && all("interfaces")]);
     say("status", "");
     document.body.dataset.surface = "complete";
   }
