@@ -157,6 +157,9 @@ impl Iterator for Selected<'_> {
     }
 }
 
+/// A tetrahedron, its number in the sub-domain and its record.
+type LocalHit = (Hit, (u32, SealedTet));
+
 /// Hits in one chunk, ascending by id.
 pub(super) fn hits_in(
     session: &mut QuerySession,
@@ -181,7 +184,7 @@ pub(super) fn hits_in(
     }
     let (hits, tets): (Vec<Hit>, Vec<(u32, SealedTet)>) = found.into_iter().unzip();
     let of_condition = session.extra_values(rank, &selection.condition_extra, &tets)?;
-    let mut found: Vec<(Hit, (u32, SealedTet))> = hits.into_iter().zip(tets).collect();
+    let mut found: Vec<LocalHit> = hits.into_iter().zip(tets).collect();
     let mut place = 0..found.len();
     found.retain(|(hit, _)| {
         let i = place.next().expect("a place for each");
@@ -203,7 +206,7 @@ fn read_hits(
     marks: &Option<Marks>,
     rank: u32,
     chunk: u32,
-) -> Result<Vec<(Hit, (u32, SealedTet))>, QueryError> {
+) -> Result<Vec<LocalHit>, QueryError> {
     let mut nearby = Nearby::default();
     let surface = match selection.needs_surface() {
         true => Some(session.surface_of(rank)?),
@@ -234,7 +237,7 @@ fn decoded_hits(
     selection: &Selection,
     rank: u32,
     chunk: u32,
-) -> Result<Vec<(Hit, (u32, SealedTet))>, QueryError> {
+) -> Result<Vec<LocalHit>, QueryError> {
     let searched = session.searched(rank, chunk)?;
     let (frame, mut hits) = (&searched.frame, Vec::new());
     searched.tree.visit(&|bounds| selection.may_meet(bounds), &mut |i| {
