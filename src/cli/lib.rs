@@ -41,6 +41,10 @@ mod threads;
 mod transfer;
 mod verify;
 mod version;
+mod view;
+mod view_answers;
+mod view_http;
+mod view_server;
 mod words;
 mod wrap;
 
@@ -218,6 +222,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Wrap(args) => wrap::run(args, console),
         Command::Snapshot(args) => snapshot::run(args, console),
         Command::Report(args) => report::run(args, console),
+        Command::View(args) => view::run(args, console),
         Command::Sample(args) => sample::run(args, console),
         Command::Completions(args) => shell::completions(args, console),
         Command::Man(args) => shell::man(args, console),

@@ -34,6 +34,7 @@ pub fn names(command: &Command) -> Vec<(&'static str, String)> {
         Command::Export(a) => (Some(a.store.clone()), None),
         Command::Snapshot(a) => (Some(a.store.clone()), None),
         Command::Report(a) => (Some(a.store.clone()), None),
+        Command::View(a) => (Some(a.store.clone()), None),
         Command::Compare(_) | Command::Sample(_) | Command::Completions(_) | Command::Man(_) => {
             (None, None)
         }

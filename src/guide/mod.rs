@@ -12,7 +12,7 @@
 //! | [`questions`] | find tetrahedra by place, condition or neighborhood |
 //! | [`fields`] | keep values at vertices and tetrahedra, ask for them, export them |
 //! | [`resaturation`] | mesh some sub-domains again, with other sizes or after damage |
-//! | [`pictures`] | draw cuts and surfaces |
+//! | [`pictures`] | draw cuts and surfaces; look at a store in the browser |
 //! | [`exports`] | files for VTK, OpenFOAM, Gmsh, NumPy, DuckDB and others |
 //! | [`scripting`] | JSON output, configuration files, shell completion |
 //! | [`library`] | the same from Rust |

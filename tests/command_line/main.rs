@@ -41,6 +41,7 @@ mod tasks;
 mod together;
 mod transfer;
 mod versions;
+mod view;
 mod walls;
 mod wires;
 mod wrap;

@@ -26,7 +26,7 @@ pub use query::QueryArgs;
 pub use resaturate::ResaturateArgs;
 pub use run::RunArgs;
 pub use shape::{InsideArgs, ShapeArgs, SizeArgs};
-pub use show::{CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
+pub use show::{CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs, ViewArgs};
 pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
 pub use surface::{
     CheckArgs, RefineSurfaceArgs, RemeshArgs, RemeshSurfaceArgs, RepairArgs, SampleArgs, SheetArgs,
@@ -160,6 +160,11 @@ pub enum Command {
     /// For any browser, in one file and without a network: numbers, tables, charts, and the mesh in space to turn and cut. Below 20 MB
     /// whatever the mesh.
     Report(ReportArgs),
+    /// Show a store in the browser: turn it, cut it anywhere, point at tetrahedra
+    ///
+    /// Prints the address of a page that only this machine sees, opens it in a browser, and answers it until Ctrl-C. Only the parts of the
+    /// store that are looked at are read; nothing is written.
+    View(ViewArgs),
     /// Write a generated surface to a file
     Sample(SampleArgs),
     /// Print a completion script for a shell
@@ -197,7 +202,7 @@ impl Command {
             Self::Snapshot(a) => a.read.json,
             Self::Report(a) => a.read.json,
             Self::Sample(a) => a.json,
-            Self::Completions(_) | Self::Man(_) => false,
+            Self::View(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
 }

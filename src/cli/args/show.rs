@@ -1,4 +1,4 @@
-//! What can be typed behind `snapshot`, `report`, `completions` and `man`.
+//! What can be typed behind `snapshot`, `report`, `view`, `completions` and `man`.
 
 use std::path::PathBuf;
 
@@ -70,6 +70,32 @@ pub struct ReportArgs {
     pub at: AtArgs,
     #[command(flatten)]
     pub read: ReadArgs,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb view part.tetdb\n  tetdb view part.tetdb --no-open --port 8080\n  tetdb view part.tetdb --at-version first --memory 1GiB\n\n\
+    The address holds a token: whoever has it sees the mesh, and nobody else. From another machine, forward the port, for example\n\
+    with `ssh -L 8080:127.0.0.1:8080 HOST`. Exit code 0 after Ctrl-C."
+)]
+pub struct ViewArgs {
+    /// The store, a directory that `tetdb mesh` wrote
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// The port to listen to [default: any that is free]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub port: Option<u16>,
+    /// Open no browser
+    #[arg(long)]
+    pub no_open: bool,
+    #[command(flatten)]
+    pub at: AtArgs,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Threads for one answer [default: all cores]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub threads: Option<usize>,
 }
 
 #[derive(Debug, clap::Args)]

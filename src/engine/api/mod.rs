@@ -22,7 +22,7 @@
 //! | `versions` | states of a store under names |
 //! | `tasks`, `tasks_status` | one mesh by the tasks of a batch scheduler |
 //! | `mpi` | one mesh by the ranks of an MPI program |
-//! | `show`, `picture`, `page`, `targets` | files for other programs, pictures, the page; protection of input files |
+//! | `show`, `picture`, `page`, `viewer`, `targets` | files for other programs, pictures, the page, a store looked at; protection of input files |
 //! | `error`, `from_errors` | errors |
 //! | `job`, `preflight`, `replace`, `guard` | internal: the job record; early refusals; replacing a store; the end of unwinding |
 
@@ -85,6 +85,7 @@ mod verify;
 mod verify_server;
 mod verify_shared;
 mod versions;
+mod viewer;
 
 pub use crate::pipeline::{AdaptForecast, AdaptPlan, ErrorEstimate, LongFaces};
 pub use crate::pipeline::{MeshOptions, OptionsText};
@@ -161,3 +162,4 @@ pub use tetdb_store::transfer::TransferMethod;
 pub use transfer::TransferredField;
 pub use verify::{Verification, VerifyLevel};
 pub use versions::{SubdomainDiff, Version, VersionDiff};
+pub use viewer::{DrawnTriangles, PickedTet, Viewer};

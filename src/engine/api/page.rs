@@ -117,7 +117,7 @@ impl Store {
 }
 
 /// Data of the page from the catalog.
-fn of_catalog(path: &Path, catalog: &mut Catalog, title: &str) -> Result<Value, Error> {
+pub(super) fn of_catalog(path: &Path, catalog: &mut Catalog, title: &str) -> Result<Value, Error> {
     let (state, job, labels) = (catalog.state()?, catalog.job()?, catalog.labels()?);
     let (rows, journal, topology) =
         (catalog.subdomains()?, catalog.journal()?, catalog.topology()?);
@@ -225,8 +225,8 @@ fn surfaces(
     progress: &dyn Fn(u64, u64),
 ) -> Result<Value, Error> {
     let bounds = session.bounds();
-    let mut scene = view::scene(session, budget);
-    let boundary = scene.boundary()?;
+    let mut scene = view::scene(std::slice::from_mut(session), budget);
+    let boundary = scene.boundary([0, 1])?;
     let channels = [
         column(&boundary, |s| s.subdomain),
         column(&boundary, |s| s.region),
@@ -234,7 +234,7 @@ fn surfaces(
     ];
     page.surface("boundary", &surface(&boundary, &channels))?;
     let boundary = shown(&boundary);
-    let interfaces = scene.interfaces()?;
+    let interfaces = scene.interfaces([0, 1])?;
     let channels = [column(&interfaces, |ranks| ranks[0]), column(&interfaces, |ranks| ranks[1])];
     page.surface("interfaces", &surface(&interfaces, &channels))?;
     let interfaces = shown(&interfaces);
@@ -259,7 +259,7 @@ fn surfaces(
     }))
 }
 
-fn column<T>(patch: &Patch<T>, of: impl Fn(&T) -> u32) -> Vec<u32> {
+pub(super) fn column<T>(patch: &Patch<T>, of: impl Fn(&T) -> u32) -> Vec<u32> {
     patch.tags.iter().map(of).collect()
 }
 
@@ -271,6 +271,11 @@ fn shown<T>(patch: &Patch<T>) -> Value {
     json!({ "of": patch.of, "shown": patch.triangles.len(), "joined": patch.cell })
 }
 
+/// One bit for each drawn edge.
+pub(super) fn edge_bits(cross: &Cross) -> u32 {
+    (0..3).map(|k| u32::from(cross.edges[k]) << k).sum()
+}
+
 /// Values for each triangle of a cut: sub-domain, region, quality and size as one byte each, and one bit for each drawn edge.
 fn of_cut(cut: &SceneCut, statistics: &Statistics) -> [Vec<u32>; 5] {
     let byte = |x: f64, [least, most]: [f64; 2]| {
@@ -278,12 +283,11 @@ fn of_cut(cut: &SceneCut, statistics: &Statistics) -> [Vec<u32>; 5] {
         (share.clamp(0.0, 1.0) * 255.0).round() as u32
     };
     let quality = [1.0, f64::from(QUALITY_MOST)];
-    let edges = |c: &Cross| (0..3).map(|k| u32::from(c.edges[k]) << k).sum();
     [
         column(&cut.patch, |c| c.subdomain),
         column(&cut.patch, |c| c.region),
         column(&cut.patch, |c| byte(f64::from(c.quality), quality)),
         column(&cut.patch, |c| byte(f64::from(c.size), statistics.size)),
-        column(&cut.patch, edges),
+        column(&cut.patch, edge_bits),
     ]
 }

@@ -6,8 +6,8 @@
 //!
 //! Reading order: `solid` (boxes, balls, planes) on `exact`; `decoded` (a decoded chunk) and `tree`; `session` (open files and caches); `locate`
 //! (points), `lazy` (a single point); `hit` (a tetrahedron with its values), `extra` (fields); `selection` (conditions), `marks` (tetrahedra on the surface and on
-//! interfaces), `surface_faces` (required faces), `select` (the hits in order of id), `order` (sorted), `extreme` (the worst few), `around`
-//! (tetrahedra around vertices and edges, neighbors).
+//! interfaces), `surface_faces` (required faces), `select` (the hits in order of id), `shared_select` (the same by several threads), `order`
+//! (sorted), `extreme` (the worst few), `around` (tetrahedra around vertices and edges, neighbors).
 
 mod around;
 mod decoded;
@@ -24,6 +24,7 @@ mod order;
 mod select;
 mod selection;
 mod session;
+mod shared_select;
 mod solid;
 mod surface_faces;
 mod tree;
@@ -41,4 +42,5 @@ pub use session::checked_chunk;
 pub use session::regions_called;
 pub use session::{Measures, QuerySession};
 pub(crate) use session::{bounds_of, chunk_bounds};
+pub use shared_select::shared_select;
 pub use solid::Solid;

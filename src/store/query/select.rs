@@ -14,6 +14,10 @@ use super::{QueryError, QuerySession};
 use crate::sealed::Subdomain;
 use tetdb_base::geom::{Aabb, IdMap, Point};
 
+/// Chunks one after the other that belong to the same share. Of shorter runs, both shares need the vertices; of longer ones, one
+/// waits for the other.
+const SHARED_RUN: usize = 4;
+
 /// The answers to [`QuerySession::select`]; holds one chunk's at a time. Ends after the first error.
 pub struct Selected<'a> {
     session: &'a mut QuerySession,
@@ -111,6 +115,10 @@ impl Selected<'_> {
                 chunks.push(chunk);
             }
         }
+        if let Some([number, of]) = self.selection.share {
+            let mut runs = (0..chunks.len()).map(|place| place / SHARED_RUN % of == number);
+            chunks.retain(|_| runs.next() == Some(true));
+        }
         self.marks = marks;
         self.chunks = chunks.into_iter();
         Ok(true)
@@ -149,6 +157,9 @@ impl Iterator for Selected<'_> {
     }
 }
 
+/// A tetrahedron, its number in the sub-domain and its record.
+type LocalHit = (Hit, (u32, SealedTet));
+
 /// Hits in one chunk, ascending by id.
 pub(super) fn hits_in(
     session: &mut QuerySession,
@@ -157,45 +168,86 @@ pub(super) fn hits_in(
     rank: u32,
     chunk: u32,
 ) -> Result<Vec<Hit>, QueryError> {
+    let n_shares = selection.share.map_or(1, |[_, of]| of);
+    let stays_decoded = selection.stays_decoded
+        && marks.is_none()
+        && !selection.needs_surface()
+        && session.has_space_for_plane(n_shares);
+    let found = match stays_decoded {
+        true => decoded_hits(session, selection, rank, chunk)?,
+        false => read_hits(session, selection, marks, rank, chunk)?,
+    };
+    let n = selection.condition_extra.len();
+    if n == 0 && selection.extra.is_empty() {
+        let hits = found.into_iter().map(|(hit, _)| hit);
+        return Ok(hits.filter(|hit| selection.holds(hit, &[])).collect());
+    }
+    let (hits, tets): (Vec<Hit>, Vec<(u32, SealedTet)>) = found.into_iter().unzip();
+    let of_condition = session.extra_values(rank, &selection.condition_extra, &tets)?;
+    let mut found: Vec<LocalHit> = hits.into_iter().zip(tets).collect();
+    let mut place = 0..found.len();
+    found.retain(|(hit, _)| {
+        let i = place.next().expect("a place for each");
+        selection.holds(hit, &of_condition[i * n..(i + 1) * n])
+    });
+    let (mut hits, tets): (Vec<Hit>, Vec<(u32, SealedTet)>) = found.into_iter().unzip();
+    let values = session.extra_values(rank, &selection.extra, &tets)?;
+    for (hit, values) in hits.iter_mut().zip(values.chunks(selection.extra.len().max(1))) {
+        hit.extra[..values.len()].copy_from_slice(values);
+    }
+    Ok(hits)
+}
+
+/// Tetrahedra of a chunk that are where the selection is, each with its record; only what is near is decoded. Most of that is not a
+/// hit, so shapes are measured after the exact test.
+fn read_hits(
+    session: &mut QuerySession,
+    selection: &Selection,
+    marks: &Option<Marks>,
+    rank: u32,
+    chunk: u32,
+) -> Result<Vec<LocalHit>, QueryError> {
     let mut nearby = Nearby::default();
     let surface = match selection.needs_surface() {
         true => Some(session.surface_of(rank)?),
         false => None,
     };
-    let needs_extra = !selection.extra.is_empty() || !selection.condition_extra.is_empty();
-    let (mut on_surface, mut kept) = (Vec::new(), Vec::new());
+    let mut kept = Vec::new();
     let frame = session.frame(rank, chunk, |part, local, tet| {
         let keep = marks.as_ref().is_none_or(|m| m.has(local))
             && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
             && (!selection.is_local() || nearby.may_meet(part, selection, chunk, tet.nodes));
         if keep {
-            on_surface.push(surface.as_ref().map(|faces| faces.of(local, tet)));
-            if needs_extra {
-                kept.push((local, *tet));
-            }
+            kept.push((local, *tet));
         }
         keep
     })?;
-    let found = frame.tets.iter().zip(on_surface);
-    let found = found.map(|(tet, on_surface)| Hit { on_surface, ..frame.hit(tet) });
-    if !needs_extra {
-        return Ok(found.filter(|found| selection.holds(found, &[])).collect());
-    }
-    let of_condition = session.extra_values(rank, &selection.condition_extra, &kept)?;
-    let n = selection.condition_extra.len();
-    let mut place = 0..kept.len();
-    let (mut hits, tets): (Vec<Hit>, Vec<(u32, SealedTet)>) = found
-        .zip(&kept)
-        .filter(|(hit, _)| {
-            let i = place.next().expect("a place for each");
-            selection.holds(hit, &of_condition[i * n..(i + 1) * n])
-        })
-        .map(|(hit, tet)| (hit, *tet))
-        .unzip();
-    let values = session.extra_values(rank, &selection.extra, &tets)?;
-    for (hit, values) in hits.iter_mut().zip(values.chunks(selection.extra.len().max(1))) {
-        hit.extra[..values.len()].copy_from_slice(values);
-    }
+    let found = frame.tets.iter().zip(kept);
+    let found = found.filter(|(tet, _)| selection.meets(&frame.corners(tet)));
+    let hits = found.map(|(tet, (local, record))| {
+        let on_surface = surface.as_ref().map(|faces| faces.of(local, &record));
+        (Hit { on_surface, ..frame.hit(tet) }, (local, record))
+    });
+    Ok(hits.collect())
+}
+
+/// The same from a chunk that is decoded as it is and stays so.
+fn decoded_hits(
+    session: &mut QuerySession,
+    selection: &Selection,
+    rank: u32,
+    chunk: u32,
+) -> Result<Vec<LocalHit>, QueryError> {
+    let searched = session.searched(rank, chunk)?;
+    let (frame, mut hits) = (&searched.frame, Vec::new());
+    searched.tree.visit(&|bounds| selection.may_meet(bounds), &mut |i| {
+        let tet = &frame.tets[i];
+        let may_be = selection.may_be(frame.id(tet), tet.region);
+        if may_be && selection.meets(&frame.corners(tet)) {
+            let record = SealedTet { nodes: frame.locals(tet), region: tet.region };
+            hits.push((frame.hit(tet), (tet.local, record)));
+        }
+    });
     Ok(hits)
 }
 

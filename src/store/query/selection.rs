@@ -42,6 +42,10 @@ pub struct Selection {
     pub condition_extra: Vec<ExtraVariable>,
     /// Variables that the hits are to have, at most [`EXTRA_MAX`](super::EXTRA_MAX).
     pub extra: Vec<ExtraVariable>,
+    /// Only the chunks of one of several shares: its number, and how many there are.
+    pub share: Option<[usize; 2]>,
+    /// True if questions about places nearby follow: chunks stay decoded where the memory is enough. Answers are the same.
+    pub stays_decoded: bool,
 }
 
 /// Vertices, some of which a tetrahedron must have.
@@ -118,17 +122,20 @@ impl Selection {
             && self.tets.as_ref().is_none_or(|l| l.contains(&id))
     }
 
-    /// Returns whether the tetrahedron satisfies the conditions on its vertices and values.
+    /// Returns whether a tetrahedron with these corners satisfies the conditions on its place.
+    pub(super) fn meets(&self, corners: &[Point; 4]) -> bool {
+        self.solids.iter().all(|solid| match self.inside {
+            true => solid.holds(corners),
+            false => solid.meets(corners),
+        })
+    }
+
+    /// Returns whether a tetrahedron in its place satisfies the conditions on its vertices and values.
     ///
     /// `extra`: values of the condition's extra variables.
     pub(super) fn holds(&self, tet: &Hit, extra: &[Scalar]) -> bool {
-        let solid = |s: &Solid| match self.inside {
-            true => s.holds(&tet.corners),
-            false => s.meets(&tet.corners),
-        };
         let is_input = |v: &u64| input_index(*v).is_some();
-        self.solids.iter().all(solid)
-            && (!self.touching_surface || tet.vertices.iter().any(is_input))
+        (!self.touching_surface || tet.vertices.iter().any(is_input))
             && self.sharing.as_ref().is_none_or(|s| s.holds(tet.id, &tet.vertices))
             && self.condition.as_ref().is_none_or(|e| truth(e, tet, extra))
     }

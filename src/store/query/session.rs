@@ -24,6 +24,8 @@ const PART_BYTES: u64 = 8 << 20;
 const PARTS_MAX: u64 = 64;
 /// Bytes beyond which more frames help no question.
 const FRAMES_BYTES_MAX: u64 = 2 << 30;
+/// Bytes of a decoded tetrahedron with its share of vertices and of the tree, at most.
+const DECODED_BYTES: u64 = 50;
 /// Bytes of the summaries of a chunk, twice, for trees.
 const SUMMARY_BYTES: u64 = 256;
 
@@ -272,6 +274,12 @@ impl QuerySession {
     /// Returns whether a chunk is decoded in memory.
     pub fn is_resident(&self, rank: u32, chunk: u32) -> bool {
         self.frames.contains(&(rank, chunk))
+    }
+
+    /// Returns whether the chunks that a plane meets can stay decoded, of the share of a session among `of`: a third of all.
+    pub(super) fn has_space_for_plane(&self, of: usize) -> bool {
+        let n: u64 = self.rows.iter().map(|row| row.tets).sum();
+        n / 3 * DECODED_BYTES / of as u64 <= self.frames_bytes_max as u64
     }
 
     /// A whole chunk, decoded.

@@ -7,7 +7,7 @@ mod pack;
 
 use std::path::Path;
 
-pub use pack::Surface;
+pub use pack::{Surface, packed};
 
 use tetdb_base::geom::Aabb;
 use tetdb_io::write::{TextFile, WriteError};
@@ -18,15 +18,23 @@ type Result<T> = std::result::Result<T, WriteError>;
 pub const ENDINGS: &str = ".html or .htm";
 
 const BODY: &str = include_str!("assets/page.html");
+const LIVE_BODY: &str = include_str!("assets/live.html");
 const STYLE: &str = include_str!("assets/page.css");
+const LIVE_STYLE: &str = include_str!("assets/live.css");
 /// Scripts in the order in which they run.
-const PROGRAM: [&str; 5] = [
-    include_str!("assets/tools.js"),
-    include_str!("assets/charts.js"),
+const PROGRAM: [&str; 6] = [
+    TOOLS,
+    CHARTS,
     include_str!("assets/page.js"),
-    include_str!("assets/view.js"),
+    VIEW,
+    HANDS,
     include_str!("assets/controls.js"),
 ];
+const LIVE_PROGRAM: [&str; 5] = [TOOLS, CHARTS, VIEW, HANDS, include_str!("assets/live.js")];
+const TOOLS: &str = include_str!("assets/tools.js");
+const CHARTS: &str = include_str!("assets/charts.js");
+const VIEW: &str = include_str!("assets/view.js");
+const HANDS: &str = include_str!("assets/hands.js");
 
 /// A page under construction; its file gets its name in [`Page::finish`].
 pub struct Page {
@@ -78,6 +86,19 @@ impl Page {
     }
 }
 
+/// The page of a viewer, which asks the server it comes from for all else. Only elements with `nonce` run.
+pub fn live(title: &str, data: &serde_json::Value, nonce: &str) -> String {
+    let (title, data) = (escaped(title), inert(&data.to_string()));
+    let scripts = LIVE_PROGRAM.map(|part| format!("<script nonce=\"{nonce}\">\n{part}</script>\n"));
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n\
+         <title>{title} – tetdb</title>\n<style nonce=\"{nonce}\">\n{STYLE}{LIVE_STYLE}</style>\n</head>\n<body>\n{LIVE_BODY}\n\
+         <script type=\"application/json\" id=\"data\">{data}</script>\n{}</body>\n</html>\n",
+        scripts.concat()
+    )
+}
+
 /// Escapes JSON so that its strings can neither end a script nor begin a comment; `<` occurs only in strings.
 fn inert(json: &str) -> String {
     json.replace('<', "\\u003c")
@@ -114,9 +135,12 @@ mod tests {
 
     #[test]
     fn a_page_asks_nobody() {
-        for part in PROGRAM.into_iter().chain([BODY, STYLE]) {
+        let parts = PROGRAM.into_iter().chain(LIVE_PROGRAM);
+        for part in parts.chain([BODY, STYLE, LIVE_BODY, LIVE_STYLE]) {
             for word in ["fetch(", "XMLHttpRequest", "import ", "src=", "url("] {
-                assert!(!part.contains(word), "{word}");
+                // That of a viewer asks its server, at one place.
+                let n = usize::from(word == "fetch(" && part.contains("fetch(`/${path}?"));
+                assert_eq!(part.matches(word).count(), n, "{word}");
             }
             let links = part.replace("http://www.w3.org/2000/svg", "");
             assert!(!links.contains("http"), "only the name of SVG is a link");

@@ -34,8 +34,13 @@ impl Packed {
     }
 }
 
-/// Packs the surface as text. Positions are rounded to 1/65535 of the longest side of `bounds`.
+/// Packs the surface as text; see [`packed`].
 pub(super) fn pack(surface: &Surface, bounds: &Aabb) -> String {
+    base64(&packed(surface, bounds))
+}
+
+/// Packs the surface as bytes. Positions are rounded to 1/65535 of the longest side of `bounds`.
+pub fn packed(surface: &Surface, bounds: &Aabb) -> Vec<u8> {
     let mut out = Packed(Vec::new());
     out.number(surface.points.len() as u32);
     out.number(surface.triangles.len() as u32);
@@ -63,7 +68,7 @@ pub(super) fn pack(surface: &Surface, bounds: &Aabb) -> String {
             out.number(run[0]);
         }
     }
-    base64(&out.0)
+    out.0
 }
 
 /// Encodes bytes in base 64. Source: RFC 4648, section 4.

@@ -98,25 +98,9 @@ function stage() {
   function legend(color) {
     const box = byId("legend");
     box.replaceChildren();
-    const ramp = ([least, most], beyond) => {
-      const stops = Array.from({ length: 11 }, (_, k) => css(scale(k / 10))).join(", ");
-      const bar = make("span", { className: "bar" });
-      bar.style.background = `linear-gradient(90deg, ${stops})`;
-      box.append(number(least, 3), bar, number(most, 3) + (beyond ? " and more" : ""));
-    };
-    if (color === "quality") return ramp(scene.quality, true);
-    if (color === "size") return ramp(scene.size, false);
-    const names = {
-      subdomain: data.subdomains.map((s) => [s.id, String(s.id)]),
-      region: data.regions.filter((r) => r.filled).map((r) => [r.region, String(r.region)]),
-      label: data.labels.map((name, i) => [i, name]),
-    }[color];
-    for (const [n, name] of names.slice(0, 16)) {
-      const swatch = make("i", {});
-      swatch.style.background = css(kind(n));
-      box.append(make("span", {}, swatch, name));
-    }
-    if (names.length > 16) box.append(`… ${count(names.length)}`);
+    if (color === "quality") return ramp(box, scene.quality, true);
+    if (color === "size") return ramp(box, scene.size, false);
+    swatches(box, kindsOf(color));
   }
 
   let due = false;
@@ -132,55 +116,7 @@ function stage() {
   form.addEventListener("submit", (event) => event.preventDefault());
   new ResizeObserver(later).observe(canvas);
 
-  const hands = new Map();
-  const spread = () => {
-    const [a, b] = [...hands.values()];
-    return Math.hypot(a.x - b.x, a.y - b.y);
-  };
-  const zoom = (factor) => {
-    view.zoom = Math.min(Math.max(view.zoom * factor, 0.2), 60);
-    later();
-  };
-  canvas.addEventListener("pointerdown", (event) => {
-    canvas.setPointerCapture(event.pointerId);
-    hands.set(event.pointerId, { x: event.clientX, y: event.clientY });
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    const hand = hands.get(event.pointerId);
-    if (!hand) return;
-    const before = hands.size === 2 ? spread() : 0;
-    const [dx, dy] = [event.clientX - hand.x, event.clientY - hand.y];
-    Object.assign(hand, { x: event.clientX, y: event.clientY });
-    if (hands.size === 2) return zoom(spread() / (before || 1));
-    if (event.shiftKey || event.buttons === 2 || event.buttons === 4) {
-      const unit = Math.hypot(...view.extent) / canvas.clientHeight / view.zoom;
-      view.shift[0] += dx * unit;
-      view.shift[1] -= dy * unit;
-    } else {
-      view.yaw -= dx * 0.008;
-      view.pitch = Math.min(Math.max(view.pitch + dy * 0.008, -1.57), 1.57);
-    }
-    later();
-  });
-  for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => hands.delete(event.pointerId));
-  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  canvas.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    zoom(Math.exp(-event.deltaY * 0.0015));
-  }, { passive: false });
-  canvas.addEventListener("dblclick", () => {
-    home();
-    later();
-  });
-  canvas.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] }[event.key];
-    if (event.key === "+" || event.key === "-") return zoom(event.key === "+" ? 1.2 : 1 / 1.2);
-    if (!step) return;
-    event.preventDefault();
-    view.yaw += step[0];
-    view.pitch = Math.min(Math.max(view.pitch + step[1], -1.57), 1.57);
-    later();
-  });
+  turnable(view, later, home);
 
   form.place.max = places - 1;
   form.place.value = Math.floor(places / 2);

@@ -57,14 +57,19 @@ function scale(share) {
 }
 const css = (rgb) => `rgb(${rgb.join(" ")})`;
 
-// A surface as it was packed: numbers of seven bits a byte, low first.
+// A surface of this page.
 function unpack(id) {
   const text = atob(byId(id).textContent.trim());
+  return unpackBytes((at) => text.charCodeAt(at));
+}
+
+// A surface as it was packed: numbers of seven bits a byte, low first.
+function unpackBytes(byteAt) {
   let at = 0;
   const next = () => {
     let value = 0, shift = 1, byte;
     do {
-      byte = text.charCodeAt(at++);
+      byte = byteAt(at++);
       value += (byte & 127) * shift;
       shift *= 128;
     } while (byte > 127);

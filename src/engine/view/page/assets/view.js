@@ -14,15 +14,16 @@ flat out vec3 color;
 flat out float drawn;
 void main() {
   int n = int(place.w * 65535.0 + 0.5);
-  vec3 away = texelFetch(middles, ivec2(n & 255, n >> 8), 0).xyz;
-  vec4 at = turn * vec4(place.xyz + apart * away, 1.0);
+  vec4 away = texelFetch(middles, ivec2(n & 255, n >> 8), 0);
+  vec4 at = turn * vec4(place.xyz + apart * away.xyz, 1.0);
   where = place.xyz;
   seen = at.xyz;
   int corner = gl_VertexID % 3;
   across = vec3(corner == 0, corner == 1, corner == 2);
   color = paint.rgb;
   drawn = paint.a * 255.0;
-  gl_Position = lens * at;
+  // Hidden sub-domains are behind everything.
+  gl_Position = away.w > 0.5 ? vec4(0.0, 0.0, 2.0, 1.0) : lens * at;
 }`;
 const FRAGMENT = `#version 300 es
 precision highp float;
@@ -88,8 +89,8 @@ class View {
     return program;
   }
 
-  // Where each sub-domain goes when they are moved apart: a texture row of 256.
-  middles() {
+  // Where each sub-domain goes when they are moved apart, and whether it is hidden: a texture in rows of 256.
+  middles(hidden = new Set()) {
     const gl = this.gl, { low } = data.scene, list = data.subdomains;
     const rows = Math.max(1, Math.ceil(list.length / 256));
     const texels = new Float32Array(4 * 256 * rows);
@@ -98,8 +99,10 @@ class View {
         const middle = (0.5 * (s.low[k] + s.high[k]) - low[k]) / this.side;
         texels[4 * s.id + k] = middle - this.extent[k] / 2;
       }
+      texels[4 * s.id + 3] = hidden.has(s.id) ? 1 : 0;
     }
-    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+    this.texture = this.texture || gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, this.texture);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, 256, rows, 0, gl.RGBA, gl.FLOAT, texels);
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
     gl.uniform1i(this.at.middles, 0);
@@ -108,6 +111,7 @@ class View {
   // `ranks[i]` is the sub-domain triangle i moves with, `masks[i]` its drawn edges; `turned` has its corners the other way round.
   add(name, packed, ranks, masks, turned = false) {
     const gl = this.gl, n = packed.nTriangles;
+    this.remove(name);
     const place = new Uint16Array(12 * n), paint = new Uint8Array(12 * n);
     for (let i = 0; i < n; i++) {
       for (let k = 0; k < 3; k++) {
@@ -119,7 +123,8 @@ class View {
     }
     const array = gl.createVertexArray();
     gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    const places = gl.createBuffer();
+    gl.bindBuffer(gl.ARRAY_BUFFER, places);
     gl.bufferData(gl.ARRAY_BUFFER, place, gl.STATIC_DRAW);
     gl.vertexAttribPointer(0, 4, gl.UNSIGNED_SHORT, true, 0, 0);
     gl.enableVertexAttribArray(0);
@@ -128,7 +133,16 @@ class View {
     gl.bufferData(gl.ARRAY_BUFFER, paint, gl.DYNAMIC_DRAW);
     gl.vertexAttribPointer(1, 4, gl.UNSIGNED_BYTE, true, 0, 0);
     gl.enableVertexAttribArray(1);
-    this.surfaces[name] = { array, buffer, paint, n };
+    this.surfaces[name] = { array, places, buffer, paint, n };
+  }
+
+  remove(name) {
+    const old = this.surfaces[name], gl = this.gl;
+    if (!old) return;
+    gl.deleteVertexArray(old.array);
+    gl.deleteBuffer(old.places);
+    gl.deleteBuffer(old.buffer);
+    delete this.surfaces[name];
   }
 
   color(name, colorOf) {
@@ -187,6 +201,15 @@ class View {
     return { turn, lens, distance };
   }
 
+  // The ray behind a place on the canvas: from the viewer, in shares of the longest side of the box.
+  ray(x, y) {
+    const { turn, lens } = this.look(0), { clientWidth, clientHeight } = this.canvas;
+    const [right, up, back] = [0, 1, 2].map((row) => [turn[row], turn[4 + row], turn[8 + row]]);
+    const [a, b] = [(2 * x / clientWidth - 1) / lens[0], (1 - 2 * y / clientHeight) / lens[5]];
+    const across = (p, q, r) => [0, 1, 2].map((k) => p * right[k] + q * up[k] + r * back[k]);
+    return [across(-turn[12], -turn[13], -turn[14]), across(a, b, -1)];
+  }
+
   draw(scene) {
     const gl = this.gl, canvas = this.canvas;
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
@@ -201,11 +224,12 @@ class View {
     gl.uniformMatrix4fv(this.at.lens, false, lens);
     gl.uniform1f(this.at.apart, 1.2 * scene.apart);
     gl.uniform1f(this.at.lines, scene.edges ? 1 : 0);
-    for (const { name, clip, flat, cull } of scene.shown) {
+    for (const { name, clip, flat, cull, over } of scene.shown) {
       const surface = this.surfaces[name];
       if (!surface) continue;
       gl.uniform4f(this.at.plane, ...(clip || [0, 0, 0, 1]));
       gl.uniform1f(this.at.flatness, flat ? 0.75 : 0);
+      gl.depthFunc(over ? gl.LEQUAL : gl.LESS);
       cull ? gl.enable(gl.CULL_FACE) : gl.disable(gl.CULL_FACE);
       gl.bindVertexArray(surface.array);
       gl.drawArrays(gl.TRIANGLES, 0, 3 * surface.n);
