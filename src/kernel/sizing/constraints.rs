@@ -16,7 +16,7 @@ use super::corners::TreeCorners;
 use super::seeds::OctreeFrame;
 use super::tree::{DEPTH, LATTICE, Leaf, Tree};
 use tetdb_base::geom::{Aabb, Point};
-use tetdb_base::storage::{SpillVec, parallel};
+use tetdb_base::storage::{SpillVec, check_cancelled, parallel};
 
 /// Levels down to which every cell is sampled.
 const LEVELS_ASKED: u32 = 5;
@@ -97,6 +97,7 @@ impl SizeConstraints<'_> {
         if !divided && (!is_asked || cell.level >= LEVELS_ASKED) {
             return Ok(vec![false]);
         }
+        check_cancelled();
         let part = |octant: usize| self.shape_of(cell.child(octant));
         let parts: Result<Vec<Vec<bool>>, _> = match cell.level < 3 {
             true => parallel(|| (0..8).into_par_iter().map(part).collect()),
