@@ -6,10 +6,11 @@
 //!
 //! Reading order: `solid` (boxes, balls, planes) on `exact`; `decoded` (a decoded chunk) and `tree`; `session` (open files and caches); `locate`
 //! (points), `lazy` (a single point); `hit` (a tetrahedron with its values), `extra` (fields); `selection` (conditions), `marks` (tetrahedra on the surface and on
-//! interfaces), `surface_faces` (required faces), `select` (the hits in order of id), `order` (sorted), `extreme` (the worst few), `around`
+//! interfaces), `surface_faces` (required faces), `select` (the hits in order of id), `chunks` (the hits of chosen chunks), `order` (sorted), `extreme` (the worst few), `around`
 //! (tetrahedra around vertices and edges, neighbors).
 
 mod around;
+mod chunks;
 mod decoded;
 mod error;
 mod exact;
@@ -28,6 +29,7 @@ mod solid;
 mod surface_faces;
 mod tree;
 
+pub use chunks::{ChunkedSelection, TetChunk};
 pub use error::QueryError;
 pub(crate) use exact::Vector;
 pub use extra::ExtraVariable;
