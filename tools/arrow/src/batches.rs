@@ -20,7 +20,7 @@ pub struct Batches {
     chunks: IntoIter<Chunk>,
     /// Rows that may still come.
     left: usize,
-    /// The condition; none where records need not be measured.
+    /// The condition.
     pub(super) query: Option<ChunkedQuery>,
     part: Option<Subdomain>,
     pub(super) fields: FieldColumns,
@@ -34,10 +34,9 @@ pub(super) type Rows = (usize, Vec<ArrayRef>);
 impl Batches {
     pub(super) fn new(scan: Scan, mut store: Store) -> Result<Self, Error> {
         let schema = scan.schema(&store)?;
-        let query = match (&scan.condition, scan.table) {
-            (Some(condition), _) => Some(store.query().where_(condition)?.by_chunk()?),
-            (None, Table::Tets) if tets::needs_shape(&schema) => Some(store.query().by_chunk()?),
-            _ => None,
+        let query = match &scan.condition {
+            Some(condition) => Some(store.query().where_(condition)?.by_chunk()?),
+            None => None,
         };
         let fields = FieldColumns::new(&store, scan.table, &schema)?;
         let (chunks, n_chunks) = scan.chunks(&mut store)?;

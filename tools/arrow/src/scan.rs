@@ -132,7 +132,8 @@ impl Scan {
             store.query().where_(condition)?;
         }
         if self.condition.is_some() && self.table != Table::Tets {
-            let message = format!("a condition selects tetrahedra, not rows of {}", self.table.name());
+            let message =
+                format!("a condition selects tetrahedra, not rows of {}", self.table.name());
             return Err(Error::new(Code::BadQuery, message)
                 .with_help("read the whole table, and select where it is read"));
         }

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from . import _native, _options, _sizes
 from ._errors import TetdbError, needed
 from ._fields import Fields
+from ._native import ArrowStream
 from ._options import Progress
 from ._sizes import Length, Size
 
@@ -400,7 +401,7 @@ class Store:
 
     def arrow(
         self, table: str = "tets", *, where: str | None = None, columns: Sequence[str] | None = None
-    ) -> _native.ArrowStream:
+    ) -> ArrowStream:
         """A table as an Arrow stream, which DuckDB, Polars, pandas and pyarrow read chunk by chunk, without copies.
 
         The answer has ``__arrow_c_stream__``: ``pyarrow.table(stream)``, ``polars.DataFrame(stream)``, or its name in a DuckDB query. No
