@@ -44,8 +44,10 @@ fn published_crates_are_described() {
         }
         assert!(package.get("publish").is_none(), "{path}");
     }
-    for path in ["tools/Cargo.toml", "tools/python/Cargo.toml", "tools/fuzz/Cargo.toml"] {
-        assert_eq!(table(path)["package"].get("publish"), Some(&Value::Boolean(false)), "{path}");
+    for path in ["tools", "tools/python", "tools/fuzz", "tools/arrow"]
+        .map(|folder| format!("{folder}/Cargo.toml"))
+    {
+        assert_eq!(table(&path)["package"].get("publish"), Some(&Value::Boolean(false)), "{path}");
     }
 }
 
@@ -58,6 +60,10 @@ fn versions_addresses_and_words_are_the_same_everywhere() {
     let python = table("tools/python/Cargo.toml");
     for word in ["version", "edition", "rust-version", "license"] {
         assert_eq!(python["package"][word], shared[word], "tools/python/Cargo.toml: {word}");
+    }
+    let arrow = table("tools/arrow/Cargo.toml");
+    for word in ["version", "edition", "license"] {
+        assert_eq!(arrow["package"][word], shared[word], "tools/arrow/Cargo.toml: {word}");
     }
     let project = table("tools/python/pyproject.toml")["project"].clone();
     assert_eq!(project["license"].as_str(), Some(&*licence));

@@ -9,7 +9,9 @@ use tetdb_base::storage::RunContext;
 use tetdb_schema::code::Code;
 pub use tetdb_schema::ids::{TetId, VertexId};
 pub use tetdb_store::query::Measures as ChunkCounts;
-use tetdb_store::query::{EXTRA_MAX, Hit, Ordered, QueryError, QuerySession, Selection, Solid};
+pub use tetdb_store::query::TetChunk;
+use tetdb_store::query::{ChunkedSelection, EXTRA_MAX, Hit, Ordered, QueryError, QuerySession};
+use tetdb_store::query::{Selection, Solid};
 
 /// Share of the memory cap for sorting answers. The session holds three quarters of the cap.
 const SORTED_SHARE: u64 = 8;
@@ -47,6 +49,9 @@ pub struct Query<'s> {
     order: Option<(usize, Order)>,
     limit: Option<usize>,
 }
+
+/// A question that is answered chunk by chunk; see [`Query::by_chunk`]. It borrows no store.
+pub struct ChunkedQuery(ChunkedSelection);
 
 /// Iterator over the answers, which are found on demand. An error is the last item.
 pub struct Answers<'s> {
@@ -232,15 +237,20 @@ impl<'s> Query<'s> {
         self
     }
 
+    /// Errors: `bad-query` for too many columns.
+    fn checked(self) -> Result<Self, Error> {
+        if self.selection.extra.len() > EXTRA_MAX {
+            let message = format!("a question answers with at most {EXTRA_MAX} numbers of fields");
+            return Err(Error::new(Code::BadQuery, message).with_help("ask for fewer columns"));
+        }
+        Ok(self)
+    }
+
     /// Starts the search. Answers are found as they are taken. Errors: damage; too little memory.
     pub fn answers(self) -> Result<Answers<'s>, Error> {
         let settings = self.store.settings();
         let (memory, dir) = (settings.cap()? / SORTED_SHARE, settings.scratch_dir());
-        let Self { store, selection, order, limit } = self;
-        if selection.extra.len() > EXTRA_MAX {
-            let message = format!("a question answers with at most {EXTRA_MAX} numbers of fields");
-            return Err(Error::new(Code::BadQuery, message).with_help("ask for fewer columns"));
-        }
+        let Self { store, selection, order, limit } = self.checked()?;
         let (context, session) = store.context_and_session()?;
         let context = context.clone();
         let found = guarded_in(&context, || match order {
@@ -250,9 +260,52 @@ impl<'s> Query<'s> {
         Ok(Answers { context, found: Some(found), left: limit.unwrap_or(usize::MAX) })
     }
 
+    /// The chunks that may have answers, in the order of ids; the others need not be read. Order and limit have no meaning here.
+    ///
+    /// ```
+    /// # use tetdb_engine::api as tetdb;
+    /// # let dir = tempfile::tempdir()?;
+    /// # let path = dir.path().join("box.tetdb");
+    /// # let mut store = tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.2")?).create(&path)?;
+    /// let chunks = store.query().where_("quality > 1.5")?.chunks()?;
+    /// let mut query = store.query().where_("quality > 1.5")?.by_chunk()?;
+    /// for chunk in chunks {
+    ///     for hit in query.answers(&mut store, chunk.subdomain, chunk.chunk)? {
+    ///         assert!(hit.shape.quality > 1.5);
+    ///     }
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    /// Errors: as [`Query::answers`].
+    pub fn chunks(self) -> Result<Vec<TetChunk>, Error> {
+        let selection = self.selection;
+        self.store.with_session(|session| Ok(session.chunks(&selection)?))
+    }
+
+    /// A question whose chunks are read one by one, as the caller chooses. Order and limit have no meaning here. Errors: as
+    /// [`Query::answers`].
+    pub fn by_chunk(self) -> Result<ChunkedQuery, Error> {
+        let Self { store, selection, .. } = self.checked()?;
+        store.with_session(|session| Ok(ChunkedQuery(ChunkedSelection::new(session, selection)?)))
+    }
+
     /// Collects all answers. Errors: as [`Query::answers`].
     pub fn collect(self) -> Result<Vec<Hit>, Error> {
         self.answers()?.collect()
+    }
+}
+
+impl ChunkedQuery {
+    /// The answers in a chunk of a sub-domain, in the order of ids. `store` is the one that was asked.
+    ///
+    /// Errors: `no-such-part`; damage; too little memory.
+    pub fn answers(
+        &mut self,
+        store: &mut Store,
+        subdomain: u32,
+        chunk: u32,
+    ) -> Result<Vec<Hit>, Error> {
+        store.with_session(|session| Ok(self.0.hits(session, subdomain, chunk)?))
     }
 }
 

@@ -6,7 +6,7 @@ use tetdb_schema::word::Word;
 use tetdb_store::sealed::Subdomain;
 
 /// Names of columns, of arrays of exports and of words of the language, which no field can have.
-const RESERVED: [&str; 22] = [
+const RESERVED: [&str; 27] = [
     "id",
     "vertices",
     "points",
@@ -29,6 +29,11 @@ const RESERVED: [&str; 22] = [
     "connectivity",
     "offsets",
     "types",
+    "v0",
+    "v1",
+    "v2",
+    "v3",
+    "tag",
 ];
 
 /// A field to be added. Type and components are those of the values where they are not set.

@@ -48,6 +48,18 @@ pub struct Store {
     session: Option<QuerySession>,
 }
 
+/// Bounds of what reads the sub-domains of a store chunk by chunk.
+#[derive(Clone)]
+pub struct Guard(RunContext);
+
+impl Guard {
+    /// Does `work` as a call of the store: the token of its settings cancels it, and a panic of the database, which damaged files can
+    /// cause, is an error.
+    pub fn run<T>(&self, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+        guarded_in(&self.0, work)
+    }
+}
+
 /// Counts, digests and labels of a store.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -132,6 +144,11 @@ impl Store {
         guarded_in(&self.context, || {
             Ok(self.catalog.share().open_subdomain(rank, SUBDOMAIN_BYTES)?)
         })
+    }
+
+    /// What keeps reads of this store's sub-domains in bounds.
+    pub fn guard(&self) -> Guard {
+        Guard(self.context.clone())
     }
 
     /// Finds the tetrahedron that contains each point; `None` outside the mesh. If several contain a point, the one with the lowest id

@@ -18,6 +18,14 @@ pub enum QueryError {
         /// The requested id.
         id: TetId,
     },
+    /// The sub-domain has no such chunk.
+    #[error("sub-domain {subdomain} has no chunk {chunk} of tetrahedra")]
+    NoChunk {
+        /// Its rank.
+        subdomain: u32,
+        /// Number of the chunk.
+        chunk: u32,
+    },
     /// The store has no such vertex.
     #[error("there is no vertex {id}")]
     NoVertex {

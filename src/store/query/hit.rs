@@ -29,6 +29,12 @@ pub const VARIABLES: [&str; 12] = [
 /// Most numbers of fields in one answer.
 pub const EXTRA_MAX: usize = 9;
 
+/// Places of `edge_min` and `angle_min` among the [`VARIABLES`]; each is followed by its greatest.
+const EDGE_MIN: usize = 7;
+const ANGLE_MIN: usize = 9;
+const _: () = assert!(matches!(VARIABLES[EDGE_MIN].as_bytes(), b"edge_min"));
+const _: () = assert!(matches!(VARIABLES[ANGLE_MIN].as_bytes(), b"angle_min"));
+
 /// The place of `excess` among the [`VARIABLES`]: the one that needs the surface.
 pub(super) const EXCESS: usize = VARIABLES.len() - 1;
 
@@ -102,8 +108,19 @@ impl Hit {
 
     /// The values of [`VARIABLES`].
     pub fn values(&self) -> [f64; VARIABLES.len()] {
+        self.values_of(|_| true)
+    }
+
+    /// The values of [`VARIABLES`] that are `wanted`; of the others that take time, NaN.
+    pub(super) fn values_of(&self, wanted: impl Fn(usize) -> bool) -> [f64; VARIABLES.len()] {
+        let pair =
+            |first: usize, pair: fn(&Self) -> [f64; 2]| match wanted(first) || wanted(first + 1) {
+                true => pair(self),
+                false => [f64::NAN; 2],
+            };
         let [x, y, z] = self.centroid().to_array();
-        let ([edge_min, edge_max], [angle_min, angle_max]) = (self.edges(), self.angles());
+        let [edge_min, edge_max] = pair(EDGE_MIN, Self::edges);
+        let [angle_min, angle_max] = pair(ANGLE_MIN, Self::angles);
         [
             self.shape.quality,
             f64::from(self.region),
@@ -116,7 +133,7 @@ impl Hit {
             edge_max,
             angle_min,
             angle_max,
-            self.excess(),
+            if wanted(EXCESS) { self.excess() } else { f64::NAN },
         ]
     }
 }

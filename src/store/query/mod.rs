@@ -6,10 +6,11 @@
 //!
 //! Reading order: `solid` (boxes, balls, planes) on `exact`; `decoded` (a decoded chunk) and `tree`; `session` (open files and caches); `locate`
 //! (points), `lazy` (a single point); `hit` (a tetrahedron with its values), `extra` (fields); `selection` (conditions), `marks` (tetrahedra on the surface and on
-//! interfaces), `surface_faces` (required faces), `select` (the hits in order of id), `shared_select` (the same by several threads), `order`
-//! (sorted), `extreme` (the worst few), `around` (tetrahedra around vertices and edges, neighbors).
+//! interfaces), `surface_faces` (required faces), `select` (the hits in order of id), `shared_select` (the same by several threads), `chunks`
+//! (the hits of chosen chunks), `order` (sorted), `extreme` (the worst few), `around` (tetrahedra around vertices and edges, neighbors).
 
 mod around;
+mod chunks;
 mod decoded;
 mod error;
 mod exact;
@@ -29,6 +30,7 @@ mod solid;
 mod surface_faces;
 mod tree;
 
+pub use chunks::{ChunkedSelection, TetChunk};
 pub use error::QueryError;
 pub(crate) use exact::Vector;
 pub use extra::ExtraVariable;

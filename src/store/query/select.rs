@@ -36,13 +36,7 @@ impl QuerySession {
     /// Errors: sub-domains the store does not have; an interface that is not there; regions that
     /// are not filled.
     pub fn select(&mut self, selection: Selection) -> Result<Selected<'_>, QueryError> {
-        self.check(&selection)?;
-        let ranks: Vec<u32> = self
-            .rows
-            .iter()
-            .filter(|row| selection.may_be_in(row.rank, &bounds_of(row)))
-            .map(|row| row.rank)
-            .collect();
+        let ranks = self.ranks_of(&selection)?;
         Ok(Selected {
             session: self,
             selection,
@@ -52,6 +46,13 @@ impl QuerySession {
             marks: None,
             ready: Vec::new().into_iter(),
         })
+    }
+
+    /// Sub-domains that may have hits. Errors: as [`QuerySession::select`].
+    pub(super) fn ranks_of(&mut self, selection: &Selection) -> Result<Vec<u32>, QueryError> {
+        self.check(selection)?;
+        let may_have = self.rows.iter().filter(|r| selection.may_be_in(r.rank, &bounds_of(r)));
+        Ok(may_have.map(|row| row.rank).collect())
     }
 
     pub(super) fn check(&mut self, selection: &Selection) -> Result<(), QueryError> {
@@ -101,24 +102,7 @@ impl Selected<'_> {
         };
         self.rank = rank;
         self.marks = None;
-        let marks = self.session.marks(rank, &self.selection)?;
-        let ranges = self.session.extra_ranges(rank, &self.selection.condition_extra)?;
-        let part = self.session.part(rank)?;
-        let mut chunks = Vec::new();
-        for (chunk, summary) in (0u32..).zip(part.subdomain.tet_summaries()) {
-            let marked = marks.as_ref().is_none_or(|m| m.any(summary.first, summary.count));
-            if marked
-                && self.selection.may_be_among(rank, summary, ranges.of(chunk))
-                && (!self.selection.is_local()
-                    || is_led_near(&part.subdomain, &self.selection, chunk as usize))
-            {
-                chunks.push(chunk);
-            }
-        }
-        if let Some([number, of]) = self.selection.share {
-            let mut runs = (0..chunks.len()).map(|place| place / SHARED_RUN % of == number);
-            chunks.retain(|_| runs.next() == Some(true));
-        }
+        let (chunks, marks) = chunks_of(self.session, &self.selection, rank)?;
         self.marks = marks;
         self.chunks = chunks.into_iter();
         Ok(true)
@@ -155,6 +139,32 @@ impl Iterator for Selected<'_> {
         }
         next.transpose()
     }
+}
+
+/// Chunks of a sub-domain that may have hits, and the tetrahedra that may be hits as far as faces decide.
+pub(super) fn chunks_of(
+    session: &mut QuerySession,
+    selection: &Selection,
+    rank: u32,
+) -> Result<(Vec<u32>, Option<Marks>), QueryError> {
+    let marks = session.marks(rank, selection)?;
+    let ranges = session.extra_ranges(rank, &selection.condition_extra)?;
+    let part = session.part(rank)?;
+    let mut chunks = Vec::new();
+    for (chunk, summary) in (0u32..).zip(part.subdomain.tet_summaries()) {
+        let marked = marks.as_ref().is_none_or(|m| m.any(summary.first, summary.count));
+        if marked
+            && selection.may_be_among(rank, summary, ranges.of(chunk))
+            && (!selection.is_local() || is_led_near(&part.subdomain, selection, chunk as usize))
+        {
+            chunks.push(chunk);
+        }
+    }
+    if let Some([number, of]) = selection.share {
+        let mut runs = (0..chunks.len()).map(|place| place / SHARED_RUN % of == number);
+        chunks.retain(|_| runs.next() == Some(true));
+    }
+    Ok((chunks, marks))
 }
 
 /// A tetrahedron, its number in the sub-domain and its record.

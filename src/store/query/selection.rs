@@ -154,10 +154,11 @@ fn may_hold(
 }
 
 fn truth(condition: &Expression, tet: &Hit, extra: &[Scalar]) -> bool {
+    let named = tet.values_of(|variable| condition.names(variable));
     if extra.is_empty() {
-        return condition.truth(&tet.values());
+        return condition.truth(&named);
     }
-    let mut values = tet.values().to_vec();
+    let mut values = named.to_vec();
     values.extend(extra.iter().map(|value| value.to_f64()));
     condition.truth(&values)
 }

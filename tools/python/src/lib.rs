@@ -1,9 +1,10 @@
 //! The native half of the Python package `tetdb`: arrays in and out of the library's front door.
 //!
 //! Reading order: `failure` (errors), `watched` (work that can be interrupted), `surface`, `sizes` and `run` (what is asked for), `tasks` (many processes), `store`,
-//! `part` and `field` (a finished mesh). Shapes, defaults, docstrings and reports are the Python half's; this half checks nothing that half has
+//! `part`, `field` and `arrow` (a finished mesh). Shapes, defaults, docstrings and reports are the Python half's; this half checks nothing that half has
 //! checked, and the library checks the rest. Is not: public; its names may change.
 
+mod arrow;
 mod failure;
 mod field;
 mod part;
@@ -20,6 +21,8 @@ use pyo3::prelude::*;
 mod _native {
     use super::*;
 
+    #[pymodule_export]
+    use super::arrow::ArrowStream;
     #[pymodule_export]
     use super::field::Field;
     #[pymodule_export]

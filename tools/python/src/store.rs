@@ -12,6 +12,7 @@ use tetdb::{
     NewField, Order, Snapshot, TransferMethod, VerifyLevel, Word,
 };
 
+use crate::arrow::ArrowStream;
 use crate::failure::Failure;
 use crate::field::Field;
 use crate::part::Part;
@@ -249,6 +250,20 @@ impl Store {
         })?;
         let n = all.len() / HIT_WORDS;
         PyArray1::from_vec(py, all).reshape([n, HIT_WORDS])
+    }
+
+    /// A table as a stream.
+    fn arrow(
+        &self,
+        py: Python<'_>,
+        table: &str,
+        condition: Option<String>,
+        columns: Option<Vec<String>>,
+    ) -> PyResult<ArrowStream> {
+        let (path, settings) = (self.path.clone(), self.settings.clone());
+        self.in_session(py, |store| {
+            ArrowStream::new(path, settings, store, (table, condition, columns))
+        })
     }
 
     /// Ids, -1 outside, and barycentric coordinates.

@@ -85,17 +85,6 @@ def test_meshio_reads_what_is_exported_and_gives_surfaces(ending: str, tmp_path:
     assert tetdb.Surface(meshio.read(tmp_path / "s.stl")).n_triangles == SURFACE.n_triangles
 
 
-def test_arrow_streams_all_tetrahedra(tmp_path: Path) -> None:
-    pytest.importorskip("pyarrow")
-    with tetdb.mesh(SURFACE, tmp_path / "s", regions="all") as store:
-        table = store.arrow(1000).read_all()
-        assert table.num_rows == store.n_tets and table.column("quality").num_chunks > 1
-        part = store.subdomain(0)
-        assert (table.column("region").to_numpy() == part.regions).all()
-        vertices = np.array(table.column("vertices").to_pylist()[:50])
-        assert (vertices == part.vertex_ids[part.tets[:50]]).all()
-
-
 @pytest.mark.parametrize(
     ("name", "words", "options"),
     [

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from . import _native, _options, _sizes
 from ._errors import TetdbError, needed
 from ._fields import Fields
+from ._native import ArrowStream
 from ._options import Progress
 from ._sizes import Length, Size
 
@@ -398,33 +399,38 @@ class Store:
         grid.cell_data["subdomain"] = mesh.subdomains
         return grid
 
-    def arrow(self, n: int = 100_000) -> Any:
-        """All tetrahedra as a ``pyarrow.RecordBatchReader``, which DuckDB and Polars read; needs the package pyarrow.
+    def arrow(
+        self, table: str = "tets", *, where: str | None = None, columns: Sequence[str] | None = None
+    ) -> ArrowStream:
+        """A table as an Arrow stream, which DuckDB, Polars, pandas and pyarrow read chunk by chunk, without copies.
 
-        Columns: `id`, `subdomain`, `region`, `quality`, `vertices` (4 lasting ids), `centroid` (3).
+        The answer has ``__arrow_c_stream__``: ``pyarrow.table(stream)``, ``polars.DataFrame(stream)``, or its name in a DuckDB query. No
+        package is needed to make it. Each reader begins with the first row, of the store as it is then.
+
+        Parameters
+        ----------
+        table : str
+            `tets`, `vertices`, `faces`, `interfaces`, `subdomains`, `regions`, `labels` or `versions`.
+        where : str, optional
+            A condition on tetrahedra as in :meth:`query`, such as ``"quality > 6 and x < 0.5"``. Chunks that cannot have such
+            tetrahedra are not read.
+        columns : sequence of str, optional
+            Names of columns, in this order; all unless given. `schema` of the answer has names and types.
+
+        Returns
+        -------
+        ArrowStream
+            Columns have the names and types of the Parquet export. Behind them are those of the fields at tetrahedra or vertices: `T`,
+            or `u.x`, `u.y`, `u.z`.
+
+        Raises
+        ------
+        TetdbError
+            ``bad-query`` for an unknown table or column, and for a condition on another table than `tets`; ``bad-expression``. Damage
+            that is met while the stream is read is an error of its reader.
         """
-        pa = needed("pyarrow")
-
-        def fixed(array: npt.NDArray[Any], width: int) -> Any:
-            return pa.FixedSizeListArray.from_arrays(pa.array(array.reshape(-1)), width)
-
-        schema = pa.schema(
-            [
-                ("id", pa.int64()), ("subdomain", pa.int32()), ("region", pa.int32()), ("quality", pa.float64()),
-                ("vertices", pa.list_(pa.int64(), 4)), ("centroid", pa.list_(pa.float64(), 3)),
-            ]
-        )  # fmt: skip
-
-        def batches() -> Iterator[Any]:
-            for chunk in self.chunks(n):
-                ranks = np.full(len(chunk.tets), chunk.subdomain, np.int32)
-                columns = [
-                    pa.array(chunk.ids), pa.array(ranks), pa.array(chunk.regions), pa.array(chunk.quality),
-                    fixed(chunk.vertex_ids[chunk.tets], 4), fixed(chunk.points[chunk.tets].mean(axis=1), 3),
-                ]  # fmt: skip
-                yield pa.record_batch(columns, schema=schema)
-
-        return pa.RecordBatchReader.from_batches(schema, batches())
+        names = None if columns is None else [str(name) for name in columns]
+        return self._native.arrow(table, where, names)
 
     # Questions.
 
