@@ -51,7 +51,7 @@ impl Parameters<'_> {
     }
 
     fn need(&mut self, name: &str) -> Result<String, Answer> {
-        self.take(name)?.ok_or_else(|| bad(format!("{name}: expected a value")))
+        self.take(name)?.ok_or_else(|| bad(format!("the parameter {name} is missing")))
     }
 
     fn share(&mut self) -> Result<u32, Answer> {
@@ -121,7 +121,7 @@ impl Call {
 
     /// Returns whether the answer may read much of the store.
     pub fn is_long(&self) -> bool {
-        matches!(self, Self::Boundary(_) | Self::Answers { .. })
+        matches!(self, Self::Boundary(_) | Self::Interfaces(_) | Self::Answers { .. })
     }
 
     /// Asks the viewer. `token`: for the page.
@@ -154,9 +154,12 @@ fn page(viewer: &mut Viewer, token: &str) -> Answer {
         return Answer::refusal(500, "the system gives no random numbers");
     };
     match viewer.page(token, &nonce) {
-        Ok(page) => {
-            Answer { status: 200, kind: "text/html", body: page.into_bytes(), nonce: Some(nonce) }
-        }
+        Ok(page) => Answer {
+            status: 200,
+            kind: "text/html; charset=utf-8",
+            body: page.into_bytes(),
+            nonce: Some(nonce),
+        },
         Err(error) => refused(error),
     }
 }

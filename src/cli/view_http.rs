@@ -7,8 +7,12 @@ use std::time::{Duration, Instant};
 /// Bytes of a request; a longer one is refused. A condition fits many times.
 const REQUEST_BYTES: usize = 16 << 10;
 const HEADERS: usize = 64;
-/// Time for a request to arrive, and for an answer to be taken.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// Time for a request to arrive: whoever opens a connection without one holds a place that others wait for.
+const ARRIVAL: Duration = Duration::from_secs(2);
+/// Time for an answer to be taken.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Bytes sent before the time is looked at.
+const SENT_BYTES: usize = 256 << 10;
 /// Time and bytes that a refused client may still send before the connection ends, so that it reads why.
 const DRAIN: Duration = Duration::from_millis(200);
 const DRAIN_BYTES: usize = 1 << 20;
@@ -46,7 +50,7 @@ impl Answer {
 
     pub fn json(status: u16, body: &serde_json::Value) -> Self {
         let body = body.to_string().into_bytes();
-        Self { status, kind: "application/json", body, nonce: None }
+        Self { status, kind: "application/json; charset=utf-8", body, nonce: None }
     }
 
     pub fn bytes(body: Vec<u8>) -> Self {
@@ -56,7 +60,7 @@ impl Answer {
 
 /// Reads a request. Errors: the answer that refuses it; `None` if the client is gone.
 pub fn read(stream: &mut TcpStream, port: u16) -> Result<Request, Option<Answer>> {
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + ARRIVAL;
     let mut bytes = Vec::new();
     loop {
         let left = deadline.saturating_duration_since(Instant::now());
@@ -148,7 +152,7 @@ pub fn send(stream: &mut TcpStream, answer: &Answer) {
     };
     let allow = if answer.status == 405 { "Allow: GET\r\n" } else { "" };
     let head = format!(
-        "HTTP/1.1 {} {reason}\r\nContent-Type: {}; charset=utf-8\r\nContent-Length: {}\r\nConnection: close\r\n{allow}\
+        "HTTP/1.1 {} {reason}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n{allow}\
          Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
          Cross-Origin-Opener-Policy: same-origin\r\nCross-Origin-Resource-Policy: same-origin\r\n\
          Content-Security-Policy: default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'{source}\r\n\r\n",
@@ -156,9 +160,13 @@ pub fn send(stream: &mut TcpStream, answer: &Answer) {
         answer.kind,
         answer.body.len(),
     );
-    let sent = (stream.set_write_timeout(Some(PATIENCE)))
-        .and_then(|()| stream.write_all(head.as_bytes()))
-        .and_then(|()| stream.write_all(&answer.body))
+    let deadline = Instant::now() + PATIENCE;
+    let mut write = |bytes: &[u8]| {
+        let left = deadline.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
+        stream.set_write_timeout(Some(left)).and_then(|()| stream.write_all(bytes))
+    };
+    let sent = write(head.as_bytes())
+        .and_then(|()| answer.body.chunks(SENT_BYTES).try_for_each(&mut write))
         .and_then(|()| stream.shutdown(Shutdown::Write));
     if sent.is_ok() && answer.status != 200 {
         drain(stream);

@@ -162,8 +162,8 @@ pub enum Command {
     Report(ReportArgs),
     /// Show a store in the browser: turn it, cut it anywhere, point at tetrahedra
     ///
-    /// Prints the address of a page that only this machine sees, opens it in a browser, and answers it until Ctrl-C. Only the parts of the
-    /// store that are looked at are read; nothing is written.
+    /// Prints the address of a page, opens it in a browser, and serves it until Ctrl-C. Other machines cannot reach it. A cut reads only the
+    /// parts of the store that it meets; nothing is written.
     View(ViewArgs),
     /// Write a generated surface to a file
     Sample(SampleArgs),

@@ -75,8 +75,8 @@ pub struct ReportArgs {
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tetdb view part.tetdb\n  tetdb view part.tetdb --no-open --port 8080\n  tetdb view part.tetdb --at-version first --memory 1GiB\n\n\
-    The address holds a token: whoever has it sees the mesh, and nobody else. From another machine, forward the port, for example\n\
-    with `ssh -L 8080:127.0.0.1:8080 HOST`. Exit code 0 after Ctrl-C."
+    The address holds a token. Only who has it sees the mesh. From another machine, forward the port:\n\
+    `ssh -L 8080:127.0.0.1:8080 HOST`. Exit code 0 after Ctrl-C."
 )]
 pub struct ViewArgs {
     /// The store, a directory that `tetdb mesh` wrote

@@ -93,7 +93,10 @@ impl Store {
             Some(i) => Ok(known.swap_remove(i).1),
             None => {
                 let names: Vec<&str> = known.iter().map(|(name, _)| &**name).collect();
-                let message = format!("{name}: expected a field, one of {}", names.join(", "));
+                let message = match names.is_empty() {
+                    true => format!("{name}: there is no such field; the store has none"),
+                    false => format!("{name}: expected a field, one of {}", names.join(", ")),
+                };
                 Err(Error::new(Code::BadQuery, message))
             }
         }

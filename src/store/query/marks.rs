@@ -84,7 +84,7 @@ impl QuerySession {
 
     fn blank(&mut self, rank: u32) -> Result<Marks, QueryError> {
         let n_tets = self.part(rank)?.subdomain.row().tets;
-        let lease = self.budget.lease(n_tets.div_ceil(64) * 8, "a bit for each tetrahedron")?;
+        let lease = self.lease(n_tets.div_ceil(64) * 8, "a bit for each tetrahedron")?;
         Ok(Marks { bits: BitSet::new(n_tets), _lease: lease })
     }
 
@@ -126,7 +126,7 @@ impl QuerySession {
         }
         let n_wires = (edges.len() + points.len()) as u64;
         let what = "embedded edges and points";
-        let _lease = self.budget.lease(n_wires * WIRE_BYTES, what)?;
+        let _lease = self.lease(n_wires * WIRE_BYTES, what)?;
         let on_wires: HashSet<u32> = (edges.iter().flatten()).chain(&points).copied().collect();
         let part = &mut self.part(rank)?.subdomain;
         let mut inputs = HashMap::new();

@@ -261,7 +261,7 @@ impl QuerySession {
             let more = bytes.saturating_sub(PART_BYTES / 8);
             let lease = match more {
                 0 => None,
-                more => Some(self.budget.lease(more, "summaries of a sub-domain")?),
+                more => Some(self.lease(more, "summaries of a sub-domain")?),
             };
             let tree =
                 OctalBoxTree::new(subdomain.tet_summaries().len(), |i| chunk_bounds(&subdomain, i));
@@ -269,6 +269,12 @@ impl QuerySession {
             self.parts.put(rank, part);
         }
         Ok(self.parts.get_mut(&rank).expect("it was just put there"))
+    }
+
+    /// Leases memory; open fields go where it is short.
+    pub(super) fn lease(&mut self, bytes: u64, what: &'static str) -> Result<Lease, QueryError> {
+        while self.budget.available() < bytes && self.fields.pop_lru().is_some() {}
+        Ok(self.budget.lease(bytes, what)?)
     }
 
     /// Returns whether a chunk is decoded in memory.
@@ -323,7 +329,7 @@ impl QuerySession {
         let part = &self.part(rank)?.subdomain;
         let (bytes, chunks) = (SurfaceFaces::bytes(part), part.row().chunks[2]);
         self.measures.face_chunks_read += u64::from(chunks);
-        let lease = (self.budget).lease(bytes, "the sides of the input triangles")?;
+        let lease = self.lease(bytes, "the sides of the input triangles")?;
         let read = SurfaceFaces::read(&mut self.part(rank)?.subdomain, lease)?;
         Ok(self.surface.insert(Arc::new(read)).clone())
     }

@@ -16,8 +16,9 @@ async function ask(kind, path, parameters) {
     throw new Error("The server does not answer; was it stopped?");
   }
   if (reply.ok) return reply;
-  const { message, where } = (await reply.json()).error;
-  throw new Error(where ? `${message} (${where})` : message);
+  const { code, message, where } = (await reply.json()).error;
+  const help = code === "store-changed" ? " Start `tetdb view` again." : "";
+  throw new Error((where ? `${message} (${where})` : message) + help);
 }
 
 // Triangles: a line of JSON, the packed surface, the values.
@@ -29,7 +30,7 @@ async function triangles(kind, path, parameters) {
   const surface = unpackBytes((at) => packed[at]);
   head.columns.forEach((name, k) => (surface[name] = surface.channels[k]));
   const values = new Float32Array(bytes.slice(end + 1 + head.bytes).buffer);
-  return Object.assign(surface, { head, values: head.values ? values : null });
+  return Object.assign(surface, { head, values: head.values ? values : null, value: parameters.value });
 }
 
 function say(id, text, isBad = false) {
@@ -88,7 +89,7 @@ function live() {
     const color = form.color.value;
     if (isKind(color)) return null;
     const field = columns.find(({ name }) => name === color);
-    const found = [shown.section, shown.answers].filter((s) => s?.head.range[0] !== null && s).map((s) => s.head.range);
+    const found = [shown.section, shown.answers].filter((s) => s?.value === color && s.head.range[0] !== null).map((s) => s.head.range);
     const own = color === "quality" ? [1, 3] : field ? field.range : [Math.min(...found.map((r) => r[0])), Math.max(...found.map((r) => r[1]))];
     const typed = [form.least, form.most].map((input, k) => (input.value === "" ? own[k] : Number(input.value)));
     return typed.every(Number.isFinite) ? typed : [0, 1];
@@ -103,7 +104,8 @@ function live() {
       const share = (i) => (surface.values[i] - ends[0]) / (ends[1] - ends[0] || 1);
       if (name === "taken") view.color(name, () => TAKEN);
       else if (!ends) view.color(name, (i) => (kinds ? kind(kinds[i]) : GRAY));
-      else view.color(name, (i) => (surface.values && !Number.isNaN(surface.values[i]) ? scale(share(i)) : GRAY));
+      // Values of another color stay gray until those of this one are there.
+      else view.color(name, (i) => (surface.values && surface.value === color && !Number.isNaN(surface.values[i]) ? scale(share(i)) : GRAY));
     }
     if (painted === wanted) return;
     painted = wanted;
@@ -175,7 +177,7 @@ function live() {
       for (let share = 0; share < data.shares[path]; share++) await get(path, share);
     };
     await Promise.all([all("boundary"), several && all("interfaces")]);
-    say("status", "");
+    if (byId("status").textContent.startsWith("reading")) say("status", "");
     document.body.dataset.surface = "complete";
   }
 
@@ -190,7 +192,7 @@ function live() {
     if (!next) {
       asked.section?.abort();
       cut = null;
-      if (axis === "free") say("status", "A direction has a number that is not 0.", true);
+      say("status", axis === "free" ? "A direction has a number that is not 0." : "", axis === "free");
       drop("section");
       thinned();
       return;
@@ -212,8 +214,7 @@ function live() {
     }, pause);
   }
 
-  async function find() {
-    const text = byId("condition").value.trim();
+  async function find(text = byId("condition").value.trim()) {
     if (!text) return forget();
     say("answer", "counting …");
     try {
@@ -297,13 +298,13 @@ function live() {
     if (name === "color") {
       form.least.value = form.most.value = "";
       if (cut && !isKind(form.color.value)) slice();
-      if (condition && !isKind(form.color.value)) find();
+      if (condition && !isKind(form.color.value)) find(condition);
     }
     later();
   });
   form.addEventListener("submit", (event) => event.preventDefault());
   byId("condition").addEventListener("keydown", (event) => event.key === "Enter" && find());
-  byId("find").addEventListener("click", find);
+  byId("find").addEventListener("click", () => find());
   byId("forget").addEventListener("click", forget);
   byId("facing").addEventListener("click", () => {
     const { turn } = view.look(0);
@@ -317,7 +318,11 @@ function live() {
   parts();
   home();
   later();
-  surfaces().catch((error) => say("status", error.message, true));
+  // What is missing of the surface stays said, whatever is asked next.
+  surfaces().catch((error) => {
+    byId("message").textContent = `The surface is not complete: ${error.message}`;
+    byId("message").hidden = false;
+  });
 }
 // The address keeps a token that is good for a second time.
 history.replaceState(null, "", `/?token=${data.token}`);
