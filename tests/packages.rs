@@ -44,7 +44,7 @@ fn published_crates_are_described() {
         }
         assert!(package.get("publish").is_none(), "{path}");
     }
-    for path in ["tools", "tools/python", "tools/fuzz", "tools/arrow"]
+    for path in ["tools", "tools/python", "tools/fuzz", "tools/arrow", "tools/sql"]
         .map(|folder| format!("{folder}/Cargo.toml"))
     {
         assert_eq!(table(&path)["package"].get("publish"), Some(&Value::Boolean(false)), "{path}");
@@ -61,9 +61,10 @@ fn versions_addresses_and_words_are_the_same_everywhere() {
     for word in ["version", "edition", "rust-version", "license"] {
         assert_eq!(python["package"][word], shared[word], "tools/python/Cargo.toml: {word}");
     }
-    let arrow = table("tools/arrow/Cargo.toml");
-    for word in ["version", "edition", "license"] {
-        assert_eq!(arrow["package"][word], shared[word], "tools/arrow/Cargo.toml: {word}");
+    for path in ["tools/arrow/Cargo.toml", "tools/sql/Cargo.toml"] {
+        for word in ["version", "edition", "license"] {
+            assert_eq!(table(path)["package"][word], shared[word], "{path}: {word}");
+        }
     }
     let project = table("tools/python/pyproject.toml")["project"].clone();
     assert_eq!(project["license"].as_str(), Some(&*licence));
@@ -88,7 +89,12 @@ fn versions_addresses_and_words_are_the_same_everywhere() {
 
 #[test]
 fn dependencies_come_from_crates_io() {
-    for path in ["Cargo.lock", "tools/python/Cargo.lock", "tests/outside/Cargo.lock"] {
+    for path in [
+        "Cargo.lock",
+        "tools/python/Cargo.lock",
+        "tools/sql/Cargo.lock",
+        "tests/outside/Cargo.lock",
+    ] {
         let lock = table(path);
         let packages = lock["package"].as_array().expect("a list");
         let sources = packages.iter().filter_map(|package| package.get("source")?.as_str());
