@@ -304,7 +304,7 @@ fn what_cannot_be_made_again_is_told() {
     refuses(&line("--subdomain 1 --hsiz -1"), "bad-size", 2);
     refuses(&line("--subdomain 1 --hmin 2 --hmax 1"), "bad-size", 2);
     // Refused at once, not when the disk is full.
-    refuses(&line("--subdomain 1 --refine-by 1e-5"), "no-room", 6);
+    refuses(&line("--subdomain 1 --refine-by 1e-5 --hgrad 10"), "no-room", 6);
     refuses(&line("--subdomain 1 --size-field none.npy"), "unreadable-file", 3);
     let npy = |shape: &str, values: &[f64]| {
         let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");

@@ -9,8 +9,8 @@ mod sizes;
 mod summary;
 
 pub use request::Resaturation;
-pub use resaturate::{Forecast, changed, forecast, recorded_request, resaturate};
+pub use resaturate::{changed, forecast, recorded_request, resaturate};
 pub use restore::{forget, previous, restore};
 pub use run::{recorded_field, room};
 pub use sizes::{NewSizes, Recorded, Values};
-pub use summary::{FieldChange, ResaturateSummary, Resaturated};
+pub use summary::{FieldChange, Forecast, ResaturateSummary, Resaturated};

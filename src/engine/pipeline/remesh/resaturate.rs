@@ -8,24 +8,13 @@ use std::collections::BTreeSet;
 use super::request::Resaturation;
 use super::run::{RemeshRun, recorded_field, room};
 use super::sizes::{NewSizes, Recorded};
-use super::summary::ResaturateSummary;
+use super::summary::{Forecast, ResaturateSummary};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::Watcher;
 use tetdb_base::storage::{Budget, attempt};
 use tetdb_schema::blob::Blob;
 use tetdb_store::store::{Catalog, StoreError};
-
-/// Number of tetrahedra of a sub-domain, now and predicted for after its remeshing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Forecast {
-    /// Rank of the sub-domain.
-    pub rank: u32,
-    /// Number of tetrahedra now.
-    pub tets: u64,
-    /// Predicted number of tetrahedra.
-    pub predicted: f64,
-}
 
 /// Remeshes sub-domains of a finished store, in one step.
 ///

@@ -6,9 +6,8 @@ use std::time::Instant;
 
 use super::fields::FieldChanges;
 use super::request::Resaturation;
-use super::resaturate::Forecast;
 use super::sizes::{Recorded, Values, predicted};
-use super::summary::{ResaturateSummary, Resaturated};
+use super::summary::{Forecast, ResaturateSummary, Resaturated};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::{Options, Plan, REFUSED_BELOW};
 use crate::pipeline::progress::Watcher;

@@ -6,6 +6,17 @@ use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::field::FieldRow;
 use tetdb_store::transfer::{TransferMethod, Transferred};
 
+/// Number of tetrahedra of a sub-domain, now and predicted for after its remeshing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// Rank of the sub-domain.
+    pub rank: u32,
+    /// Number of tetrahedra now.
+    pub tets: u64,
+    /// Predicted number of tetrahedra.
+    pub predicted: f64,
+}
+
 /// Rows of a sub-domain before and after remeshing.
 #[derive(Clone, Debug)]
 pub struct Resaturated {
