@@ -1,4 +1,4 @@
-//! What the page of `view` can ask for, and the answers.
+//! Questions of the page of `view`, and their answers.
 
 use serde_json::{Value, json};
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 /// Bytes of a request; a longer one is refused. A condition fits many times.
 const REQUEST_BYTES: usize = 16 << 10;
 const HEADERS: usize = 64;
-/// Time for a request to arrive: whoever opens a connection without one holds a place that others wait for.
+/// Time for a request to arrive. A connection without one holds a place that others wait for.
 const ARRIVAL: Duration = Duration::from_secs(2);
 /// Time for an answer to be taken.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -31,7 +31,7 @@ pub struct Request {
     pub token: Option<String>,
 }
 
-/// What is sent back.
+/// An answer.
 #[derive(Debug)]
 pub struct Answer {
     pub status: u16,

@@ -146,7 +146,7 @@ impl Store {
         })
     }
 
-    /// What keeps reads of this store's sub-domains in bounds.
+    /// Cancels reads of this store's sub-domains, and turns panics of its database into errors.
     pub fn guard(&self) -> Guard {
         Guard(self.context.clone())
     }

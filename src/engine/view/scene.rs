@@ -2,9 +2,10 @@
 
 use super::cluster::{Cluster, Patch, TRIANGLE_BYTES};
 use super::section::{View, pieces};
+use super::shell::for_each_triangle;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Budget, Lease, check_cancelled};
-use tetdb_schema::record::{FACES, NO_TET};
+use tetdb_schema::record::FACES;
 use tetdb_store::query::{Hit, QueryError, QuerySession, Selection, Solid, shared_select};
 
 /// Largest number of triangles of the boundary, of all interfaces, and of one cut. A page with all of them is below 12 MB.
@@ -86,25 +87,10 @@ impl Scene<'_> {
         let (mut cluster, _lease) = self.cluster(BOUNDARY_MOST / share[1] as usize)?;
         let session = &mut self.sessions[0];
         for (rank, chunk) in chunks(session, 2, share) {
-            check_cancelled();
-            session.count_faces();
-            let fin_first = session.wires.fin_first;
-            let part = &mut session.part(rank)?.subdomain;
-            for facet in part.facet_chunk(chunk)?.records {
-                if facet.triangle >= fin_first {
-                    continue;
-                }
-                // The side behind the triangle comes first: its normal points away from that side.
-                let Some(side) = [1, 0].into_iter().find(|&s| facet.tets[s] != NO_TET) else {
-                    continue;
-                };
-                let mut corners = part.corners(facet.vertices)?.map(|c| c.point);
-                if side == 0 {
-                    corners.swap(1, 2);
-                }
-                let (region, label) = (facet.regions[side], facet.label);
+            for_each_triangle(session, (rank, chunk), |corners, region, label| {
                 cluster.push(corners, ClippedSkin { subdomain: rank, region, label });
-            }
+                Ok(())
+            })?;
         }
         Ok(cluster.finish())
     }

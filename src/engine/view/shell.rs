@@ -83,26 +83,39 @@ pub fn normal_of(session: &mut QuerySession, cut: u32) -> Result<Point, QueryErr
     }
 }
 
+/// Calls `each` with the corners, the region and the label of the input triangles of a chunk of faces that have a tetrahedron on a side;
+/// normals point away from it.
+pub(super) fn for_each_triangle(
+    session: &mut QuerySession,
+    (rank, chunk): (u32, u32),
+    mut each: impl FnMut([Point; 3], u32, u32) -> Result<(), QueryError>,
+) -> Result<(), QueryError> {
+    check_cancelled();
+    session.count_faces();
+    let fin_first = session.wires.fin_first;
+    let part = &mut session.part(rank)?.subdomain;
+    for facet in part.facet_chunk(chunk)?.records {
+        if facet.triangle >= fin_first {
+            continue;
+        }
+        // The side behind the triangle comes first: its normal points away from that side.
+        let Some(side) = [1, 0].into_iter().find(|&s| facet.tets[s] != NO_TET) else {
+            continue;
+        };
+        let mut corners = part.corners(facet.vertices)?.map(|c| c.point);
+        if side == 0 {
+            corners.swap(1, 2);
+        }
+        each(corners, facet.regions[side], facet.label)?;
+    }
+    Ok(())
+}
+
 fn triangles(session: &mut QuerySession, rank: u32, all: &mut Shown) -> Result<(), QueryError> {
     for chunk in 0..session.part(rank)?.subdomain.row().chunks[2] {
-        check_cancelled();
-        session.count_faces();
-        let fin_first = session.wires.fin_first;
-        let part = &mut session.part(rank)?.subdomain;
-        for facet in part.facet_chunk(chunk)?.records {
-            if facet.triangle >= fin_first {
-                continue;
-            }
-            // The side behind the triangle comes first: its normal points away from that side.
-            let Some(side) = [1, 0].into_iter().find(|&s| facet.tets[s] != NO_TET) else {
-                continue;
-            };
-            let mut corners = part.corners(facet.vertices)?.map(|c| c.point);
-            if side == 0 {
-                corners.swap(1, 2);
-            }
-            all.push(corners, rank, facet.regions[side], Some(facet.label))?;
-        }
+        for_each_triangle(session, (rank, chunk), |corners, region, label| {
+            all.push(corners, rank, region, Some(label))
+        })?;
     }
     Ok(())
 }

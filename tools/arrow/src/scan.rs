@@ -1,4 +1,4 @@
-//! What is asked of a table, and the chunks that have to be read for it.
+//! A question to a table, and the chunks to read for it.
 
 use std::fmt;
 

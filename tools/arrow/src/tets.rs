@@ -11,7 +11,7 @@ use tetdb::data::{DVec3, Hit};
 use super::batches::Rows;
 use super::{Batches, Chunk};
 
-/// What is read of the tetrahedra in a chunk, as far as columns need it; otherwise empty.
+/// The data of the tetrahedra in a chunk that columns need; the rest is empty.
 #[derive(Default)]
 struct Tets {
     ids: Vec<TetId>,
