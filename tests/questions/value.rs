@@ -133,3 +133,34 @@ fn only_chunks_that_matter_are_read() -> Outcome {
     assert!(read.vertex_chunks_read < chunks.vertex_chunks / 2, "{read:?}");
     Ok(())
 }
+
+#[test]
+fn whole_chunks_have_no_other_tetrahedra() -> Outcome {
+    let fixture = real_of("box,h=0.035")?;
+    let mut session = fixture.session(64 << 20)?;
+    let (mut n_whole, mut n_part) = (0, 0);
+    for text in ["x < 0.5", "quality < 2", "region = 1 and subdomain = 0", "angle_min > 0", "true"]
+    {
+        let condition = Some(Expression::parse(text, &VARIABLES)?);
+        let selection = Selection { condition, ..Selection::default() };
+        let chunks = session.chunks(&selection)?;
+        let n_expected = session.select(selection.clone())?.count();
+        let mut of_chunks = ChunkedSelection::new(&mut session, selection.clone())?;
+        let mut n = 0;
+        for TetChunk { subdomain, chunk, n_tets, is_whole } in chunks {
+            let hits = of_chunks.hits(&mut session, subdomain, chunk)?.len();
+            assert!(!is_whole || hits == n_tets as usize, "{text}: {hits} of {n_tets}");
+            *(if is_whole { &mut n_whole } else { &mut n_part }) += 1;
+            n += hits;
+        }
+        assert_eq!(n, n_expected, "{text}");
+        let near = vec![Solid::Sphere { center: Point::splat(0.5), radius: 9.0 }];
+        let chunks = session.chunks(&Selection { solids: near, ..selection })?;
+        assert!(
+            chunks.iter().all(|chunk| !chunk.is_whole),
+            "places are never known from summaries"
+        );
+    }
+    assert!(n_whole > 0 && n_part > 0, "{n_whole} whole, {n_part} in part");
+    Ok(())
+}

@@ -63,7 +63,18 @@ impl Expression {
 
     /// Like [`Expression::may_hold`], where some variables may also not be numbers.
     pub fn may_hold_with(&self, ranges: &[[f64; 2]], nan: &[bool]) -> bool {
+        self.truths(ranges, nan)[0]
+    }
+
+    /// Returns whether it, a truth, holds wherever each variable lies in its closed range; `nan` tells which may also not be numbers.
+    ///
+    /// True is certain, false is not. Panics as [`Expression::truth`].
+    pub fn must_hold_with(&self, ranges: &[[f64; 2]], nan: &[bool]) -> bool {
+        self.truths(ranges, nan)[1]
+    }
+
+    fn truths(&self, ranges: &[[f64; 2]], nan: &[bool]) -> [bool; 2] {
         assert_eq!(self.kind, ExprKind::Truth, "a number is no truth");
-        ranges::may_hold(&self.ops, &self.lists, ranges, nan)
+        ranges::truths(&self.ops, &self.lists, ranges, nan)
     }
 }

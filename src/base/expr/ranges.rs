@@ -45,8 +45,13 @@ impl Interval {
     }
 }
 
-/// See [`Expression::may_hold`].
-pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]], nan: &[bool]) -> bool {
+/// Returns whether a truth can hold, and whether it must: see [`Expression::may_hold`](super::Expression::may_hold).
+pub(super) fn truths(
+    ops: &[Op],
+    lists: &[Vec<f64>],
+    ranges: &[[f64; 2]],
+    nan: &[bool],
+) -> [bool; 2] {
     let mut stack = [ANY; STACK_MAX];
     let mut n = 0;
     for op in ops {
@@ -80,7 +85,7 @@ pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]], nan:
             }
         }
     }
-    stack[0].high > 0.0
+    [stack[0].high > 0.0, stack[0].low > 0.0]
 }
 
 fn unary(f: Unary, x: Interval) -> Interval {

@@ -185,6 +185,7 @@ proptest! {
             (low + shares[i] * (high - low)).clamp(low, high)
         });
         prop_assert!(expression.may_hold(&ranges) || !expression.truth(&values), "{}", tree.text());
+        prop_assert!(!expression.must_hold_with(&ranges, &[]) || expression.truth(&values), "{}", tree.text());
     }
 
     /// No text makes the parser panic, and faults lie within it.
@@ -322,4 +323,21 @@ fn ranges_rule_out_what_cannot_be() {
     for text in ["x >= 1", "quality > 2 and y = 5", "exp(x) > 100", "y in [5]"] {
         assert!(may(text, ranges), "{text}");
     }
+}
+
+#[test]
+fn ranges_tell_what_holds_everywhere() {
+    let ranges = [[0.0, 1.0], [5.0, 5.0], [1.0, 2.5]];
+    let must = |text: &str, nan: &[bool]| {
+        Expression::parse(text, &NAMES).expect(text).must_hold_with(&ranges, nan)
+    };
+    for text in ["x <= 1", "y = 5 and quality < 3", "not (x > 1)", "x < 0 or x + y < 6.5", "true"] {
+        assert!(must(text, &[]), "{text}");
+    }
+    for text in ["x < 1", "y in [5]", "exp(x) > 0", "quality <= 2.4", "x != 0.5"] {
+        assert!(!must(text, &[]), "{text}");
+    }
+    // What is not a number fulfills no comparison, except that it differs.
+    assert!(!must("x <= 1", &[true, false, false]));
+    assert!(must("y = 5 or x <= 1", &[true, false, false]));
 }

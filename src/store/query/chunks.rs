@@ -15,6 +15,8 @@ pub struct TetChunk {
     pub chunk: u32,
     /// Number of its tetrahedra.
     pub n_tets: u32,
+    /// True if all of them are hits for sure: they can be counted without being read.
+    pub is_whole: bool,
 }
 
 /// A selection that is read chunk by chunk.
@@ -30,11 +32,12 @@ impl QuerySession {
         let mut all = Vec::new();
         for rank in self.ranks_of(selection)? {
             let (chunks, _) = chunks_of(self, selection, rank)?;
+            let ranges = self.extra_ranges(rank, &selection.condition_extra)?;
             let summaries = self.part(rank)?.subdomain.tet_summaries();
-            all.extend(chunks.into_iter().map(|chunk| TetChunk {
-                subdomain: rank,
-                chunk,
-                n_tets: summaries[chunk as usize].count,
+            all.extend(chunks.into_iter().map(|chunk| {
+                let summary = &summaries[chunk as usize];
+                let is_whole = selection.holds_for_all(rank, summary, ranges.of(chunk));
+                TetChunk { subdomain: rank, chunk, n_tets: summary.count, is_whole }
             }));
         }
         Ok(all)

@@ -38,6 +38,10 @@ const _: () = assert!(matches!(VARIABLES[ANGLE_MIN].as_bytes(), b"angle_min"));
 /// The place of `excess` among the [`VARIABLES`]: the one that needs the surface.
 pub(super) const EXCESS: usize = VARIABLES.len() - 1;
 
+/// The variables that may be no number: of a tetrahedron so flat that a face has no area in doubles, or so large that a product overflows.
+pub(super) const NAN_AT: [bool; VARIABLES.len()] =
+    [false, false, false, true, false, false, false, false, false, true, true, true];
+
 /// A tetrahedron in an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {

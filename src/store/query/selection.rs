@@ -5,7 +5,7 @@ use tetdb_schema::field::Scalar;
 use tetdb_schema::ids::TetId;
 
 use super::extra::ExtraVariable;
-use super::hit::{EXCESS, Hit, ranges};
+use super::hit::{EXCESS, Hit, NAN_AT, ranges};
 use super::solid::Solid;
 use crate::sealed::input_index;
 use tetdb_base::expr::Expression;
@@ -98,6 +98,25 @@ impl Selection {
             && self.tets.as_ref().is_none_or(|l| l.iter().any(listed))
             && self.may_meet(&Aabb { low, high })
             && self.condition.as_ref().is_none_or(|e| may_hold(e, &ranges(chunk, rank), extra))
+    }
+
+    /// Returns whether all tetrahedra of a chunk are hits for sure.
+    pub(super) fn holds_for_all(
+        &self,
+        rank: u32,
+        chunk: &TetSummary,
+        (extra, extra_nan): (&[[f64; 2]], &[bool]),
+    ) -> bool {
+        let others = self.is_local() || self.touching_surface || self.touching_sheet;
+        let lists = self.regions.is_some() || self.tets.is_some() || self.labels.is_some();
+        if others || lists || self.interface.is_some() {
+            return false;
+        }
+        self.condition.as_ref().is_none_or(|condition| {
+            let own = ranges(chunk, rank);
+            let nan = [&NAN_AT[..], extra_nan].concat();
+            condition.must_hold_with(&[&own, extra].concat(), &nan)
+        })
     }
 
     /// Returns whether tetrahedra within `bounds` may satisfy the conditions on places.

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use arrow_schema::SchemaRef;
-use tetdb::{Code, Error, Store};
+use tetdb::{Code, Error, Store, TetChunk};
 
 use super::{Batches, Table};
 
@@ -14,6 +14,8 @@ pub struct Chunk {
     pub subdomain: u32,
     /// Number of the chunk in the sub-domain.
     pub chunk: u32,
+    /// Its number of rows, if all of them are known to be rows of the answer.
+    pub whole: Option<u32>,
 }
 
 /// A question to one table: all rows and columns, unless less is asked for.
@@ -95,12 +97,15 @@ impl Scan {
             (Some(chunks), _) => chunks.clone(),
             (None, Some(condition)) => {
                 let found = store.query().where_(condition)?.chunks()?.into_iter();
-                found.map(|c| Chunk { subdomain: c.subdomain, chunk: c.chunk }).collect()
+                let whole = |c: &TetChunk| c.is_whole.then_some(c.n_tets);
+                found
+                    .map(|c| Chunk { subdomain: c.subdomain, chunk: c.chunk, whole: whole(&c) })
+                    .collect()
             }
             (None, None) => {
                 let of = |row: &tetdb::data::schema::catalog::SubdomainRow| {
                     let subdomain = row.rank;
-                    (0..row.chunks[kind]).map(move |chunk| Chunk { subdomain, chunk })
+                    (0..row.chunks[kind]).map(move |chunk| Chunk { subdomain, chunk, whole: None })
                 };
                 rows.iter().flat_map(of).collect()
             }
