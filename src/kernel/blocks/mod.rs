@@ -60,8 +60,10 @@ pub struct BlockReport {
 
 /// Fewest tetrahedra of the scaffold's lengths that are worth a saturation of their own.
 const COARSE_TETS: f64 = 20_000.0;
-/// Margins for what was put off by all blocks, in wanted lengths.
-const WIDER_MARGINS: [f64; 3] = [8.0, 24.0, 80.0];
+/// Rings of bricks, each those that the bricks before refer to, around what was put off by all blocks.
+const RINGS: [u32; 4] = [1, 2, 4, 8];
+/// No further ring is begun with so many bricks: the region would be several times that of a visit.
+const RING_BRICKS_MAX: usize = 1_024;
 
 /// Divides tetrahedra until the mesh is saturated; smooths it unless `mode` is `None`, and improves bad tetrahedra if it is `Full`.
 ///
@@ -238,18 +240,20 @@ impl Visits<'_, '_> {
     }
 
     /// Divides what no block could, in wider and wider regions. There is little of it, if any; returns how many tetrahedra are left.
+    ///
+    /// What a point changes is connected, so the regions are grown from brick to brick. Margins in lengths would take the whole of a scan:
+    /// where lengths grow from a fine surface inwards, much lies within a few of the lengths inside.
     fn finish_rest(&self) -> u64 {
         let mut visitor = Visitor::new();
-        for margin in WIDER_MARGINS {
+        for rings in RINGS {
             for block in &self.partition.blocks {
                 let left: Vec<u32> =
                     block.bricks.clone().filter(|&b| self.bricks.get(b).unexamined > 0).collect();
                 if left.is_empty() {
                     continue;
                 }
-                let bounds = self.partition.bounds_of(&left);
                 let is_left = |b: u32| left.binary_search(&b).is_ok();
-                let numbers = self.partition.around(&bounds, is_left, margin);
+                let numbers = self.rings_around(&left, rings);
                 self.within(&mut visitor, &numbers, is_left, |visitor, is_own, own| {
                     let before = visitor.region.mesh.vertices.len() as u32;
                     self.divide(visitor, is_own, own);
@@ -261,6 +265,26 @@ impl Visits<'_, '_> {
             }
         }
         self.partition.blocks.iter().map(|block| self.n_unexamined(block)).sum()
+    }
+
+    /// These bricks and those around them, ascending.
+    fn rings_around(&self, bricks: &[u32], rings: u32) -> Vec<u32> {
+        let mut all = bricks.to_vec();
+        let mut last = all.clone();
+        for _ in 0..rings {
+            if all.len() >= RING_BRICKS_MAX {
+                break;
+            }
+            let mut next: Vec<u32> =
+                last.iter().flat_map(|&b| self.bricks.get(b).near.clone()).collect();
+            next.sort_unstable();
+            next.dedup();
+            next.retain(|b| all.binary_search(b).is_err());
+            all.extend_from_slice(&next);
+            all.sort_unstable();
+            last = next;
+        }
+        all
     }
 
     fn n_unexamined(&self, block: &partition::Block) -> u64 {

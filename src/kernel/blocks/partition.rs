@@ -230,11 +230,6 @@ impl KdPartition {
         }
     }
 
-    /// The box around the cells of some bricks.
-    pub fn bounds_of(&self, bricks: &[u32]) -> Aabb {
-        bricks.iter().fold(Aabb::EMPTY, |all, &b| all.union(self.bricks[b as usize].0))
-    }
-
     /// The bricks that `is_own` and those within `margin` lengths of the box around them; a brick's length is that wanted in its middle. In ascending
     /// order.
     pub fn around(&self, own: &Aabb, is_own: impl Fn(u32) -> bool, margin: f64) -> Vec<u32> {

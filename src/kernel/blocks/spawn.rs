@@ -25,6 +25,9 @@ const EDGE: f64 = 0.93;
 const HEIGHT_MIN: f64 = 0.6;
 /// A larger circumcenter than this is no place for a point, even if it lies inside.
 const CENTER_MAX: f64 = 1.3;
+/// Farthest place of a point from the nearest corner of its tetrahedron, in the length wanted there. Circumcenters of flat tetrahedra lie anywhere;
+/// where all is divided they are beyond a required face or too near to others, and looking for them leads out of every region.
+const FAR: f64 = 4.0;
 /// Mark of good tetrahedra.
 pub(super) const GOOD: usize = crate::mesh::anatomy::mark::RESCUED;
 
@@ -90,7 +93,7 @@ impl Spawner {
         }
     }
 
-    /// Adds a candidate of a tetrahedron unless one of its corners is too near.
+    /// Adds a candidate of a tetrahedron unless one of its corners is too near, or all are too far.
     pub fn add(
         &mut self,
         mesh: &FlatMesh,
@@ -102,9 +105,10 @@ impl Spawner {
         let h = (field.h)(point);
         let candidate = Candidate { point, h: h as f32, tet };
         let corners = mesh.corners(mesh.tet(tet));
-        let is_near =
-            corners.iter().any(|v| candidate.refuses((v.point - point).length_squared(), v.h()));
-        if !is_near && field.place.admits(point, h) {
+        let squares = corners.map(|v| (v.point - point).length_squared());
+        let is_near = (0..4).any(|i| candidate.refuses(squares[i], corners[i].h()));
+        let is_far = (0..4).all(|i| squares[i].sqrt() > FAR * f64::from(corners[i].h()));
+        if !is_near && !is_far && field.place.admits(point, h) {
             self.found.push((order.index(point), candidate));
         }
     }
