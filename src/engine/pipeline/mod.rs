@@ -44,7 +44,7 @@ pub use progress::silent;
 pub use progress::{Event, Watcher};
 pub use remesh::{
     FieldChange, Forecast, NewSizes, ResaturateSummary, Resaturated, Resaturation, Values, changed,
-    forecast, forget, previous, recorded_request, resaturate, restore,
+    forecast, forget, previous, recorded_request, resaturate, restore, shells,
 };
 pub use tasks::serve;
 pub use tasks::{

@@ -1,5 +1,6 @@
 //! Size fields of remeshed sub-domains.
 
+use super::shell::Shell;
 use crate::pipeline::error::PipelineError;
 use tetdb_schema::blob::Blob;
 use tetdb_store::sealed::SealedError;
@@ -272,6 +273,10 @@ fn skin(
     rank: u32,
     memory: u64,
 ) -> Result<(Vec<Point>, Vec<[u32; 3]>), PipelineError> {
+    if catalog.coarse_snapshot(rank)?.is_none() {
+        let shell = Shell::read(&mut catalog.open_subdomain(rank, (memory / 2) as usize)?)?;
+        return Ok((shell.points(), shell.triangles));
+    }
     let mut leaf = catalog.open_coarse(rank, (memory / 2) as usize)?;
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     for chunk in leaf.vertices() {
