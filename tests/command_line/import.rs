@@ -24,6 +24,13 @@ fn medit(points: &str, tets: &[&str], triangles: &[&str]) -> String {
     text + &format!("Tetrahedra\n{}\n{lines}End\n", tets.len())
 }
 
+/// An array of NumPy.
+fn npy(kind: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
+    let head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape},)}}\n");
+    let length = (head.len() as u16).to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &length[..], head.as_bytes(), bytes].concat()
+}
+
 /// A store of two regions.
 fn balls(place: &Place) -> String {
     place
@@ -95,10 +102,77 @@ fn sub_domains_are_those_of_planes_or_of_the_file() {
     place.run_line("snapshot b.tetdb b.png").succeeds();
     place.run_line("report b.tetdb b.html").succeeds();
     place.run_line("field b.tetdb add t --at vertices --from x").succeeds();
-    let error = place.run_line("resaturate b.tetdb --subdomain 1 --json").error();
+    // What is on disk of a sub-domain that was never meshed here is all there is of it.
+    let error = place.run_line("resaturate b.tetdb --subdomain 1 --repair --json").error();
     assert_eq!(error["code"], "no-coarse-leaf");
-    assert!(error["message"].to_string().contains("imported"), "{error}");
     place.run_line("resume b.tetdb --no-verify").succeeds();
+}
+
+/// Sub-domains are meshed again from their shells, whatever threads and memory; undo brings back the file's mesh.
+#[test]
+fn imported_sub_domains_are_meshed_again() {
+    let place = Place::new();
+    balls(&place);
+    place.run_line("export a.tetdb a.vtu").succeeds();
+    for n in [1, 3] {
+        let import = format!("import a.vtu -o b.tetdb --subdomains {n} --force --no-verify");
+        let mut digests = Vec::new();
+        for limits in ["--threads 1 --memory 64MiB", "--threads 2 --memory 96MiB", ""] {
+            place.run_line(&import).succeeds();
+            let before = place.digest("b.tetdb");
+            place.run_line("field b.tetdb add t --at vertices --from x").succeeds();
+            let all: Vec<String> = (0..n).map(|rank: u32| rank.to_string()).collect();
+            let line = format!("resaturate b.tetdb --subdomain {} --refine-by 0.6", all.join(","));
+            let forecast = place.run_line(&format!("{line} --dry-run --json")).succeeds().json();
+            assert_eq!(forecast["subdomains"].as_array().map(Vec::len), Some(n as usize));
+            place.run_line(&format!("{line} {limits}")).succeeds();
+            digests.push(place.digest("b.tetdb"));
+            assert_ne!(digests[0], before);
+            place.run_line("verify b.tetdb --full").succeeds();
+            let info = place.run_line("info b.tetdb --json").succeeds().json();
+            let range = &info["fields"][0]["ranges"][0];
+            assert_eq!((&range["low"], &range["high"]), (&0.0.into(), &1.0.into()));
+            // Meshed anew from the snapshot that is there by now, it is the same.
+            place.run_line("resaturate b.tetdb --subdomain 0 --repair").succeeds();
+            assert_eq!(place.digest("b.tetdb"), digests[0]);
+            place.run_line("resaturate b.tetdb --undo").succeeds();
+            assert_eq!(place.digest("b.tetdb"), before);
+        }
+        assert!(digests.iter().all(|digest| *digest == digests[0]), "{n}: {digests:?}");
+    }
+    for sizes in ["", "--hsiz 0.1", "--size-sphere 0.5,0.5,0.5,0.2,0.05"] {
+        place.run_line(&format!("resaturate b.tetdb --subdomain 1 {sizes}")).succeeds();
+        place.run_line("verify b.tetdb --full").succeeds();
+    }
+}
+
+/// Parts of a file may touch themselves at edges and vertices, and lie in pieces.
+#[test]
+fn parts_that_touch_themselves_are_meshed_again() {
+    let place = Place::new();
+    place.run_line("mesh sample:box,h=0.25 -o a.tetdb --no-verify").succeeds();
+    place.run_line("export a.tetdb a.npy").succeeds();
+    let n = place.run_line("info a.tetdb --json").succeeds().json()["tets"].as_u64();
+    let n = n.expect("a number");
+    // Every third tetrahedron, but for a few: nearly none has a neighbor in its part.
+    let parts: Vec<u8> = (0..n).map(|t| (t * t % 7 % 3) as u8).collect();
+    place.write("a_p.npy", npy("|u1", &n.to_string(), &parts));
+    place.run_line("import a.npy -o b.tetdb --part-field p").succeeds();
+    place.run_line("resaturate b.tetdb --subdomain 0,1,2 --refine-by 0.4").succeeds();
+    place.run_line("verify b.tetdb --full").succeeds();
+}
+
+#[test]
+fn an_imported_mesh_is_adapted_to_a_field() {
+    let place = Place::new();
+    place.run_line("mesh sample:box,h=0.12 -o a.tetdb --no-verify").succeeds();
+    place.run_line("export a.tetdb a.meshb").succeeds();
+    place.run_line("import a.meshb -o b.tetdb --subdomains 3 --no-verify").succeeds();
+    place.run_line("field b.tetdb add t --at vertices --from exp(-50*(x-0.5)^2)").succeeds();
+    let before = place.digest("b.tetdb");
+    place.run_line("adapt b.tetdb --field t --factor 3").succeeds();
+    assert_ne!(place.digest("b.tetdb"), before);
+    place.run_line("verify b.tetdb --full").succeeds();
 }
 
 #[test]

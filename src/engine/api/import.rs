@@ -21,7 +21,8 @@ use tetdb_store::store::{Catalog, StoreError};
 ///
 /// The mesh is checked: every tetrahedron has an exactly positive volume, and two tetrahedra share a whole face, an edge, a vertex or
 /// nothing. No vertex moves and no tetrahedron is changed. Boundary, faces between regions and labelled triangles are the store's surface.
-/// The store is finished, and everything works on it that needs no coarse mesh.
+/// The store is finished, and everything works on it that works on a mesh of ours. [`Store::remesh`] starts from the faces around a
+/// sub-domain and its regions.
 ///
 /// ```no_run
 /// # use tetdb_engine::api as tetdb;

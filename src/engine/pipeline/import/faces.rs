@@ -12,7 +12,7 @@ use tetdb_schema::page::NONE;
 use tetdb_schema::record::{FACES, SealedTet};
 use tetdb_store::sealed::{BitSet, FacePairs, Paired, sorted_face};
 
-const CONFORM_HELP: &str = "repair the mesh where it comes from: two tetrahedra share a whole face, an edge, a vertex or nothing";
+pub const CONFORM_HELP: &str = "repair the mesh where it comes from: two tetrahedra share a whole face, an edge, a vertex or nothing";
 
 /// Tetrahedra with their sub-domains, and what is collected while their faces are matched.
 struct Matching<'a> {

@@ -2,6 +2,7 @@
 
 use super::BadMesh;
 use super::faces::match_faces;
+use super::overlap;
 use super::place::{FileTriangles, Parts, Placed, Placing, region_numbers, renumber};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::Watcher;
@@ -36,5 +37,7 @@ pub fn place(
     let Placing { vertices, parts_of, .. } = placing;
     let triangles = triangles.finish();
     let file = FileTriangles { triangles, labels, stem, regions, notes };
-    match_faces(vertices, tets, parts_of, file, space, watch)
+    let mut placed = match_faces(vertices, tets, parts_of, file, space, watch)?;
+    overlap::check(&mut placed, space)?;
+    Ok(placed)
 }

@@ -55,7 +55,9 @@ impl Shell {
             }
         }
         if next < numbers.len() {
-            return Err(part.damaged("a face of its shell names a vertex that is not there").into());
+            return Err(part
+                .damaged("a face of its shell names a vertex that is not there")
+                .into());
         }
         let on_shell = |v: u32| numbers.partition_point(|&w| w < v) as u32;
         facets.iter_mut().for_each(|f| f.vertices = f.vertices.map(on_shell));
@@ -85,7 +87,8 @@ impl Shell {
 
     /// Regions of the sub-domain in front of and behind each triangle; 0 where it is not. Errors: damage.
     pub fn sides(&self, part: &mut Subdomain) -> Result<Vec<[u32; 2]>, SealedError> {
-        let here = |f: &SealedFacet| [0, 1].map(|i| if f.tets[i] == NONE { 0 } else { f.regions[i] });
+        let here =
+            |f: &SealedFacet| [0, 1].map(|i| if f.tets[i] == NONE { 0 } else { f.regions[i] });
         let mut sides: Vec<[u32; 2]> = self.facets.iter().map(here).collect();
         sides.resize(self.triangles.len(), [0; 2]);
         let own = self.triangle_of.iter().zip(&self.faces);

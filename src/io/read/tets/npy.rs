@@ -29,6 +29,7 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
         check_point(p, points.place())?;
         mesh.point(p);
     }
+    points.end()?;
     let (n, mut corners) = array(&tets, 4)?;
     let column = |name: Option<&str>, default: &str, n: u64| -> Result<Option<Numbers>> {
         let path = beside(name.unwrap_or(default));
@@ -59,6 +60,7 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
         let taken = mesh.tet([a?, b?, c?, d?], region, part);
         taken.map_err(|fault| corners.place().refuse(fault))?;
     }
+    [regions, parts].into_iter().flatten().chain([corners]).try_for_each(Numbers::end)?;
     let triangles = beside("triangles");
     if triangles.is_file() {
         let (n, mut corners) = array(&triangles, 3)?;
@@ -69,6 +71,7 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
             let label = mesh.labels.number(next(&mut labels)?);
             mesh.triangle(corners, label);
         }
+        labels.into_iter().chain([corners]).try_for_each(Numbers::end)?;
     }
     Ok(())
 }

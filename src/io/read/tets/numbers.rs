@@ -215,6 +215,22 @@ impl Numbers {
         })
     }
 
+    /// Ends reading. Errors: there are more numbers.
+    pub fn end(mut self) -> Result<()> {
+        let is_over = match &mut self.from {
+            From::Text(feed) => feed.at_end()?,
+            From::Binary(binary) => binary.next().is_none(),
+        };
+        match is_over {
+            true => Ok(()),
+            false => {
+                let expected = format!("the end of the array of {}", self.what);
+                let found = "more numbers".to_owned();
+                Err(self.place.refuse(ReadFault::Unexpected { expected, found }))
+            }
+        }
+    }
+
     pub fn place(&self) -> &FilePlace {
         &self.place
     }

@@ -193,7 +193,7 @@ impl Grid {
             check_point(p, numbers.place())?;
             mesh.point(p);
         }
-        Ok(())
+        numbers.end()
     }
 
     fn cell_array(
@@ -290,6 +290,9 @@ impl Grid {
                 }
             }
         }
+        [types, ends, vertices].into_iter().try_for_each(Numbers::end)?;
+        let lists = [regions, parts, labels, ghosts];
+        lists.into_iter().flatten().try_for_each(Numbers::end)?;
         Ok(n_ghosts)
     }
 }
