@@ -251,4 +251,17 @@ fn damaged_files() {
     let region = ("a_region.npy", npy("<i4", "2,", &[1, 2]));
     refused(&[tets, points(), region], "count-mismatch", "2 declared", "a_region.npy");
     refused(&[("a.xyz", b"mesh".into())], "unknown-format", "not known", "a.xyz");
+    refused(&[("a.vtkhdf", b"mesh".into())], "unexpected-text", "an HDF5 file", "a.vtkhdf");
+    let place = Place::new();
+    place.run_line("mesh sample:box,h=0.3 -o a.tetdb --no-verify").succeeds();
+    place.run_line("export a.tetdb a.vtkhdf").succeeds();
+    let bytes = std::fs::read(place.path("a.vtkhdf")).expect("a file");
+    for n in [bytes.len() / 4, bytes.len() / 2, bytes.len() - 1000] {
+        refused(
+            &[("a.vtkhdf", bytes[..n].to_vec())],
+            "truncated-file",
+            "ends too early",
+            "a.vtkhdf",
+        );
+    }
 }

@@ -67,7 +67,29 @@ pub fn match_faces(
         shared,
         on_surface,
         kept: kept.finish(),
+        values: file.values,
     })
+}
+
+/// The faces of a tetrahedron: the number of each, its vertices ascending, and whether that order is odd in the tetrahedron.
+///
+/// One sort serves all four: of ascending vertices, faces 1 and 3 are odd.
+fn sorted_faces(nodes: [u32; 4]) -> [(usize, [u32; 3], bool); 4] {
+    let mut keys: [u64; 4] = std::array::from_fn(|i| u64::from(nodes[i]) << 2 | i as u64);
+    let mut odd = false;
+    for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)] {
+        let (a, b) = (keys[i], keys[j]);
+        odd ^= a > b;
+        (keys[i], keys[j]) = (a.min(b), a.max(b));
+    }
+    let [a, b, c, d] = keys.map(|key| (key >> 2) as u32);
+    let number = keys.map(|key| key as usize & 3);
+    [
+        (number[0], [b, c, d], odd),
+        (number[1], [a, c, d], !odd),
+        (number[2], [a, b, d], odd),
+        (number[3], [a, b, c], !odd),
+    ]
 }
 
 struct KeptFaces {
@@ -108,7 +130,10 @@ impl Matching<'_> {
 
     /// Sets the sub-domain of each tetrahedron and matches the faces within some thousands at a time; the others go to the sort.
     fn take_tets(&mut self, watch: &Watcher) -> Result<(), PipelineError> {
-        let n = self.tets.len();
+        let (n, is_whole) = (self.tets.len(), self.parts_of.count() == 1);
+        if is_whole {
+            self.first_part.fill(0);
+        }
         let mut pairs = FacePairs::new(AT_ONCE);
         let mut some = Vec::new();
         for from in (0..n).step_by(AT_ONCE) {
@@ -120,21 +145,24 @@ impl Matching<'_> {
             for t in from..n.min(from + AT_ONCE) {
                 let [a, b, c, d, region, group] = self.tets.get(t);
                 let nodes = [a, b, c, d];
-                let corners = nodes.map(|v| self.point(v));
-                let part = self.parts_of.of(group, &corners);
-                self.tets.set(t, [a, b, c, d, region, part]);
+                let points = &mut self.vertices.points;
+                let corners = || nodes.map(|v| Point::from_array(points.get(v as usize)));
+                let part = self.parts_of.of(group, corners);
+                if part != group {
+                    self.tets.set(t, [a, b, c, d, region, part]);
+                }
                 some.push((nodes, region, part));
                 let rotated = SealedTet { nodes, region }.rotated().nodes;
-                self.order.push(PartTet { part, nodes: rotated, region })?;
-                for v in nodes {
+                self.order.push(PartTet { part, nodes: rotated, region, tet: t as u32 })?;
+                // Of a single sub-domain nothing is shared.
+                for v in nodes.into_iter().filter(|_| !is_whole) {
                     match self.first_part.get(v as usize) {
                         NONE => self.first_part.set(v as usize, part),
                         first if first == part => {}
                         _ => self.shared.push(SharedVertex { vertex: v, part })?,
                     }
                 }
-                for (i, corners) in FACES.into_iter().enumerate() {
-                    let (face, odd) = sorted_face(corners.map(|k| nodes[k]));
+                for (i, face, odd) in sorted_faces(nodes) {
                     let side = FaceSide { face, is_tet: true, odd, of: (t << 2 | i) as u32 };
                     if face.into_iter().all(|v| self.marked.contains(v.into())) {
                         self.sides.push(side)?;
@@ -275,5 +303,23 @@ fn label_of(builder: &mut SurfaceBuilder, labels: &mut Vec<u32>, file: &FileTria
         [] => builder.label(&file.stem),
         [one] => one,
         _ => builder.label_of_all(&ids),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faces_are_sorted_as_one_by_one() {
+        for code in 0..256usize {
+            let nodes = [0, 2, 4, 6].map(|shift| 7 * (code as u32 >> shift & 3) + 1);
+            if (1..4).any(|i| nodes[..i].contains(&nodes[i])) {
+                continue;
+            }
+            for (i, face, odd) in sorted_faces(nodes) {
+                assert_eq!((face, odd), sorted_face(FACES[i].map(|k| nodes[k])), "{nodes:?} {i}");
+            }
+        }
     }
 }
