@@ -10,7 +10,7 @@ use tetdb_base::storage::{ScratchSpace, Sorter, SpillVec, SpillVecBuilder, check
 use tetdb_base::surface::SurfaceBuilder;
 use tetdb_schema::page::NONE;
 use tetdb_schema::record::{FACES, SealedTet};
-use tetdb_store::sealed::{BitSet, FacePairs, Paired, sorted_face};
+use tetdb_store::sealed::{BitSet, FacePairs, Paired, sorted_face, sorted_faces};
 
 pub const CONFORM_HELP: &str = "repair the mesh where it comes from: two tetrahedra share a whole face, an edge, a vertex or nothing";
 
@@ -69,27 +69,6 @@ pub fn match_faces(
         kept: kept.finish(),
         values: file.values,
     })
-}
-
-/// The faces of a tetrahedron: the number of each, its vertices ascending, and whether that order is odd in the tetrahedron.
-///
-/// One sort serves all four: of ascending vertices, faces 1 and 3 are odd.
-fn sorted_faces(nodes: [u32; 4]) -> [(usize, [u32; 3], bool); 4] {
-    let mut keys: [u64; 4] = std::array::from_fn(|i| u64::from(nodes[i]) << 2 | i as u64);
-    let mut odd = false;
-    for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)] {
-        let (a, b) = (keys[i], keys[j]);
-        odd ^= a > b;
-        (keys[i], keys[j]) = (a.min(b), a.max(b));
-    }
-    let [a, b, c, d] = keys.map(|key| (key >> 2) as u32);
-    let number = keys.map(|key| key as usize & 3);
-    [
-        (number[0], [b, c, d], odd),
-        (number[1], [a, c, d], !odd),
-        (number[2], [a, b, d], odd),
-        (number[3], [a, b, c], !odd),
-    ]
 }
 
 struct KeptFaces {
@@ -303,23 +282,5 @@ fn label_of(builder: &mut SurfaceBuilder, labels: &mut Vec<u32>, file: &FileTria
         [] => builder.label(&file.stem),
         [one] => one,
         _ => builder.label_of_all(&ids),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn faces_are_sorted_as_one_by_one() {
-        for code in 0..256usize {
-            let nodes = [0, 2, 4, 6].map(|shift| 7 * (code as u32 >> shift & 3) + 1);
-            if (1..4).any(|i| nodes[..i].contains(&nodes[i])) {
-                continue;
-            }
-            for (i, face, odd) in sorted_faces(nodes) {
-                assert_eq!((face, odd), sorted_face(FACES[i].map(|k| nodes[k])), "{nodes:?} {i}");
-            }
-        }
     }
 }

@@ -6,8 +6,8 @@
 use std::collections::BTreeSet;
 use std::time::Instant;
 
-use super::run::{recorded_field, room};
 use super::shell::{Shell, without_snapshot};
+use super::sizes::{recorded_field, room};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::mesh::coarse::{recovered_and_colored, triangulate};
 use crate::pipeline::plan::{Options, Plan};

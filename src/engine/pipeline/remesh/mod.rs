@@ -13,7 +13,6 @@ mod summary;
 pub use request::Resaturation;
 pub use resaturate::{changed, forecast, recorded_request, resaturate};
 pub use restore::{forget, previous, restore};
-pub use run::{recorded_field, room};
 pub use shell::shells;
-pub use sizes::{NewSizes, Recorded, Values};
+pub use sizes::{NewSizes, Recorded, Values, recorded_field, room};
 pub use summary::{FieldChange, Forecast, ResaturateSummary, Resaturated};

@@ -9,8 +9,8 @@ use std::collections::BTreeSet;
 
 use super::coarse::add_snapshots;
 use super::request::Resaturation;
-use super::run::{RemeshRun, recorded_field, room};
-use super::sizes::{NewSizes, Recorded};
+use super::run::RemeshRun;
+use super::sizes::{NewSizes, Recorded, recorded_field, room};
 use super::summary::{Forecast, ResaturateSummary};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;

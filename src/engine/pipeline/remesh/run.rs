@@ -6,8 +6,7 @@ use std::time::Instant;
 
 use super::fields::FieldChanges;
 use super::request::Resaturation;
-use super::shell::shells;
-use super::sizes::{Recorded, Values, predicted};
+use super::sizes::{Recorded, Values, predicted, recorded_field, room};
 use super::summary::{Forecast, ResaturateSummary, Resaturated};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::{Options, Plan, REFUSED_BELOW};
@@ -20,9 +19,9 @@ use crate::pipeline::work::soundness::{check_owners, panic_is_damage_of};
 use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::workers::{WorkerFn, map_bounded};
 use tetdb_base::geom::{Aabb, Point};
-use tetdb_base::storage::{Backing, Budget, DiskPath, ScratchSpace, attempt, available_bytes};
+use tetdb_base::storage::{Backing, Budget, DiskPath, attempt, available_bytes};
 use tetdb_kernel::mesh::Workspace;
-use tetdb_kernel::sizing::{BackgroundMesh, ExtraSizes, SizeField};
+use tetdb_kernel::sizing::{BackgroundMesh, SizeField};
 use tetdb_schema::blob::{Blob, BlobContent};
 use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow, VersionRow};
 use tetdb_schema::field::FieldPart;
@@ -465,37 +464,6 @@ impl<'a> RemeshRun<'a> {
         }
         summary
     }
-}
-
-/// Scratch space with the remaining budget, for arrays of size fields.
-pub fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, PipelineError> {
-    // A store without the writer's lock may be on a read-only disk.
-    let folder = match catalog.lock() {
-        Some(_) => catalog.scratch_dir()?,
-        None => std::env::temp_dir().into(),
-    };
-    Ok(ScratchSpace::new(budget.available(), folder))
-}
-
-/// Reads the recorded size field of the whole mesh. That of an imported store comes from the edges of all shells.
-pub fn recorded_field(
-    catalog: &mut Catalog,
-    options: &Options,
-    room: &ScratchSpace,
-) -> Result<SizeField, PipelineError> {
-    let bytes = match catalog.blob(Blob::SizeField)? {
-        Some(bytes) => bytes,
-        None if catalog.job()?.is_imported() => {
-            let (surface, sizes) = (shells(catalog, room)?, &options.mesh.sizes);
-            let (points, triangles) = (&surface.points, &surface.triangles);
-            let extra = ExtraSizes::default();
-            return Ok(SizeField::build_with(points, triangles, sizes, &extra, room)?.0);
-        }
-        None => Vec::new(),
-    };
-    let diagonal = tree::bounds(catalog)?.diagonal();
-    let field = SizeField::from_bytes_in(&bytes, room)?;
-    Ok(field.with_sources(&options.mesh.sizes, diagonal)?)
 }
 
 /// Returns whether fields have values on this mesh, now or in a version. They lie as its chunks do.

@@ -7,6 +7,7 @@ mod abaqus;
 mod gmsh;
 mod gmsh_data;
 mod gmsh_sink;
+mod hdf_rows;
 mod medit;
 mod npy;
 mod numbers;

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
-use super::vtkhdf::HdfRows;
+use super::hdf_rows::HdfRows;
 use super::{Feed, FilePlace, ReadFault, Result};
 use crate::read::error::Spot;
 use crate::read::xml::base64_word;

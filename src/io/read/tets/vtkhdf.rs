@@ -5,18 +5,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use hdf5_reader::{
-    Dataset, Datatype, FileStorage, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem,
-};
+use hdf5_reader::{Dataset, FileStorage, Hdf5File, OpenOptions};
 
+use super::hdf_rows::kind;
 use super::vtu::{ArrayAt, Grid, Piece};
 use super::{FilePlace, MeshFields, RawMesh, ReadError, ReadFault, Result};
-
-/// Numbers of an array that are read at once.
-const AT_ONCE: u64 = 1 << 15;
-
-/// Fallible calls of the reader of HDF5.
-type Found<T> = std::result::Result<T, hdf5_reader::error::Error>;
 
 pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
     let cap = mesh.space.cap() as usize;
@@ -79,7 +72,12 @@ fn pieces(file: &Hdf5File, place: &FilePlace) -> Result<Vec<Piece>> {
             arrays.extend(array(section, name, path, &dataset));
         }
     }
-    let (mut first, mut pieces) = ([0; 4], Vec::new());
+    if n_points.len() != n_cells.len() || n_points.len() != n_corners.len() {
+        let (what, found) = ("partitions", format!("{} with cells", n_cells.len()));
+        let declared = n_points.len().to_string();
+        return Err(place.refuse(ReadFault::CountMismatch { what, declared, found }));
+    }
+    let (mut first, mut pieces) = ([0u64; 4], Vec::new());
     for (number, ((&points, &cells), &corners)) in
         (0..).zip(n_points.iter().zip(&n_cells).zip(&n_corners))
     {
@@ -99,6 +97,19 @@ fn pieces(file: &Hdf5File, place: &FilePlace) -> Result<Vec<Piece>> {
         let counts = [points, cells, corners, cells.saturating_add(1)];
         first = std::array::from_fn(|i| counts[i].saturating_add(first[i]));
     }
+    for ArrayAt { section, name, format, rows, .. } in &arrays {
+        let declared = match (section.as_str(), name.as_str()) {
+            ("Points" | "PointData", _) => first[0],
+            ("Cells", "connectivity") => first[2],
+            ("Cells", "offsets") => first[3],
+            _ => first[1],
+        };
+        if declared != *rows {
+            let (what, found) = ("rows of an array", format!("{rows} in {format}"));
+            let declared = declared.to_string();
+            return Err(place.refuse(ReadFault::CountMismatch { what, declared, found }));
+        }
+    }
     Ok(pieces)
 }
 
@@ -106,69 +117,6 @@ fn pieces(file: &Hdf5File, place: &FilePlace) -> Result<Vec<Piece>> {
 fn array(section: &str, name: String, path: String, dataset: &Dataset) -> Option<ArrayAt> {
     let kind = kind(dataset.dtype())?.to_owned();
     let n_components = dataset.shape().iter().skip(1).product::<u64>() as usize;
-    let section = section.to_owned();
-    Some(ArrayAt { section, name, kind, n_components, format: path, at: 0, rows: 0 })
-}
-
-/// The word of VTK for a type of numbers.
-fn kind(datatype: &Datatype) -> Option<&'static str> {
-    Some(match datatype {
-        Datatype::FixedPoint { size: 1, signed: true, .. } => "Int8",
-        Datatype::FixedPoint { size: 1, .. } => "UInt8",
-        Datatype::FixedPoint { size: 2, signed: true, .. } => "Int16",
-        Datatype::FixedPoint { size: 2, .. } => "UInt16",
-        Datatype::FixedPoint { size: 4, signed: true, .. } => "Int32",
-        Datatype::FixedPoint { size: 4, .. } => "UInt32",
-        Datatype::FixedPoint { size: 8, signed: true, .. } => "Int64",
-        Datatype::FixedPoint { size: 8, .. } => "UInt64",
-        Datatype::FloatingPoint { size: 4, .. } => "Float32",
-        Datatype::FloatingPoint { size: 8, .. } => "Float64",
-        _ => return None,
-    })
-}
-
-/// Rows of an array of a file, read block by block.
-pub struct HdfRows {
-    dataset: Dataset,
-    next: u64,
-    end: u64,
-}
-
-impl HdfRows {
-    /// So many rows from one on.
-    pub fn new(dataset: Dataset, first: u64, rows: u64) -> Self {
-        Self { dataset, next: first, end: first.saturating_add(rows) }
-    }
-
-    /// The bytes of the next rows, low ones first; `None` at the end, or where data are damaged or missing.
-    pub fn next_block(&mut self) -> Option<Vec<u8>> {
-        let columns: u64 = self.dataset.shape().iter().skip(1).product();
-        let end = self.end.min(self.next + (AT_ONCE / columns.max(1)).max(1));
-        if end <= self.next || end > *self.dataset.shape().first()? {
-            return None;
-        }
-        let mut selections = vec![SliceInfoElem::Slice { start: self.next, end, step: 1 }];
-        let others = self.dataset.shape().iter().skip(1);
-        selections.extend(others.map(|&n| SliceInfoElem::Slice { start: 0, end: n, step: 1 }));
-        let rows = SliceInfo { selections };
-        self.next = end;
-        macro_rules! bytes {
-            ($type:ty) => {{
-                let read: Found<_> = self.dataset.read_slice::<$type>(&rows);
-                Some(read.ok()?.iter().flat_map(|x| x.to_le_bytes()).collect())
-            }};
-        }
-        match kind(self.dataset.dtype())? {
-            "Int8" => bytes!(i8),
-            "UInt8" => bytes!(u8),
-            "Int16" => bytes!(i16),
-            "UInt16" => bytes!(u16),
-            "Int32" => bytes!(i32),
-            "UInt32" => bytes!(u32),
-            "Int64" => bytes!(i64),
-            "UInt64" => bytes!(u64),
-            "Float32" => bytes!(f32),
-            _ => bytes!(f64),
-        }
-    }
+    let (section, rows) = (section.to_owned(), dataset.shape().first().copied()?);
+    Some(ArrayAt { section, name, kind, n_components, format: path, at: 0, rows })
 }

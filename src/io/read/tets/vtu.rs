@@ -8,8 +8,8 @@ use std::path::Path;
 
 use hdf5_reader::Hdf5File;
 
+use super::hdf_rows::HdfRows;
 use super::numbers::{Coding, Layout, Numbers, field_number};
-use super::vtkhdf::HdfRows;
 use super::{FilePlace, MeshFields, RawMesh, ReadError, ReadFault, Result};
 use crate::read::error::Spot;
 use crate::read::feed::{check_point, quote};
@@ -46,6 +46,17 @@ pub struct Piece {
 
 /// Name of the array that stands for the partitions of a VTKHDF file.
 const PARTITION: &str = "partition";
+
+/// The arrays of the cells of a piece.
+struct CellArrays {
+    types: Numbers,
+    ends: Numbers,
+    vertices: Numbers,
+    /// Regions, parts, labels and kinds of copies, where there are any.
+    lists: [Option<Numbers>; 4],
+    /// Values, and their fields.
+    values: Vec<(usize, Numbers)>,
+}
 
 /// An array of values that is taken: its name, its section, and its field.
 type TakenArray = (String, String, usize);
@@ -311,6 +322,35 @@ impl Grid {
         }
     }
 
+    /// Opens the arrays of the cells of a piece. Errors: one is missing.
+    fn cell_arrays(
+        &self,
+        piece: &Piece,
+        fields: MeshFields,
+        taken: &[TakenArray],
+    ) -> Result<CellArrays> {
+        let array = |name: &str, what| {
+            let array = piece.arrays.iter().find(|a| a.section == "Cells" && a.name == name);
+            self.numbers(array.ok_or_else(|| self.expected(0, what))?, what)
+        };
+        let has =
+            |name: &&str| piece.arrays.iter().any(|a| a.section == "CellData" && a.name == *name);
+        let region = fields.region.or(Some("region").filter(has));
+        let (label, ghost) = (Some("label").filter(has), Some("vtkGhostType").filter(has));
+        Ok(CellArrays {
+            types: array("types", "the types of cells")?,
+            ends: array("offsets", "the offsets of cells")?,
+            vertices: array("connectivity", "the vertices of cells")?,
+            lists: [
+                self.cell_array(piece, region, "the region of a cell")?,
+                self.cell_array(piece, fields.part, "the part of a cell")?,
+                self.cell_array(piece, label, "the label of a cell")?,
+                self.cell_array(piece, ghost, "the kind of a copied cell")?,
+            ],
+            values: self.taken_numbers(piece, taken, "CellData")?,
+        })
+    }
+
     /// Reads the cells of a piece; returns how many are copies.
     fn cells(
         &self,
@@ -323,23 +363,9 @@ impl Grid {
         if piece.n_cells == 0 {
             return Ok(0);
         }
-        let array = |name: &str, what| {
-            let array = piece.arrays.iter().find(|a| a.section == "Cells" && a.name == name);
-            self.numbers(array.ok_or_else(|| self.expected(0, what))?, what)
-        };
-        let mut types = array("types", "the types of cells")?;
-        let mut ends = array("offsets", "the offsets of cells")?;
-        let mut vertices = array("connectivity", "the vertices of cells")?;
-        let has =
-            |name: &&str| piece.arrays.iter().any(|a| a.section == "CellData" && a.name == *name);
-        let region = fields.region.or(Some("region").filter(has));
-        let mut regions = self.cell_array(piece, region, "the region of a cell")?;
-        let mut parts = self.cell_array(piece, fields.part, "the part of a cell")?;
-        let mut labels =
-            self.cell_array(piece, Some("label").filter(has), "the label of a cell")?;
-        let ghost = Some("vtkGhostType").filter(has);
-        let mut ghosts = self.cell_array(piece, ghost, "the kind of a copied cell")?;
-        let mut values = self.taken_numbers(piece, taken, "CellData")?;
+        let CellArrays { mut types, mut ends, mut vertices, lists, mut values } =
+            self.cell_arrays(piece, fields, taken)?;
+        let [mut regions, mut parts, mut labels, mut ghosts] = lists;
         let mut row = Vec::new();
         let (mut from, mut n_ghosts) = (0, 0);
         let next = |list: &mut Option<Numbers>| list.as_mut().map_or(Ok(0), Numbers::integer);
