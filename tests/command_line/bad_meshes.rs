@@ -257,11 +257,7 @@ fn damaged_files() {
     place.run_line("export a.tetdb a.vtkhdf").succeeds();
     let bytes = std::fs::read(place.path("a.vtkhdf")).expect("a file");
     for n in [bytes.len() / 4, bytes.len() / 2, bytes.len() - 1000] {
-        refused(
-            &[("a.vtkhdf", bytes[..n].to_vec())],
-            "truncated-file",
-            "ends too early",
-            "a.vtkhdf",
-        );
+        let cut = ("a.vtkhdf", bytes[..n].to_vec());
+        refused(&[cut], "unexpected-text", "unexpected end of data", "a.vtkhdf");
     }
 }

@@ -145,6 +145,8 @@ fn imported_sub_domains_are_meshed_again() {
             assert_eq!(place.digest("b.tetdb"), digests[0]);
             place.run_line("resaturate b.tetdb --undo").succeeds();
             assert_eq!(place.digest("b.tetdb"), before);
+            let line = "resaturate b.tetdb --subdomain 0 --repair --json";
+            assert_eq!(place.run_line(line).error()["code"], "no-coarse-leaf");
         }
         assert!(digests.iter().all(|digest| *digest == digests[0]), "{n}: {digests:?}");
     }

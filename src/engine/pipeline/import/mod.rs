@@ -20,4 +20,4 @@ mod write;
 pub use bad_mesh::BadMesh;
 pub use place::Placed;
 pub use prepare::place;
-pub use write::{StoreValues, write};
+pub use write::{GENERATION, StoreValues, write};

@@ -29,8 +29,8 @@ use tetdb_schema::unsealed::TetLinks;
 use tetdb_store::sealed::{Form, Sealed, SealedWriter, sorted_face};
 use tetdb_store::store::{Catalog, INPUT_TRIANGLES};
 
-/// Generation of the files.
-const GENERATION: u32 = 1;
+/// Generation of the files. No later mesh of a sub-domain has it.
+pub const GENERATION: u32 = 1;
 
 /// The numbers that name a face of an interface.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]

@@ -9,6 +9,7 @@ use super::request::Resaturation;
 use super::sizes::{Recorded, Values, predicted, recorded_field, room};
 use super::summary::{Forecast, ResaturateSummary, Resaturated};
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::import::GENERATION;
 use crate::pipeline::plan::{Options, Plan, REFUSED_BELOW};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::{journal, sum_totals, totals_of};
@@ -99,7 +100,9 @@ impl<'a> RemeshRun<'a> {
         for &rank in &what.ranks {
             let row = catalog.subdomain(rank)?;
             let kept = catalog.coarse_snapshot(rank)?;
-            if kept.is_none() && (what.repair || !is_imported) {
+            // The mesh of the file is not that of the snapshot made later.
+            let is_of_file = is_imported && row.generation == GENERATION;
+            if is_of_file && what.repair || kept.is_none() && !is_imported {
                 let (path, subdomain) = (catalog.dir().to_owned(), rank);
                 return Err(StoreError::NoCoarseSnapshot { path, subdomain }.into());
             }

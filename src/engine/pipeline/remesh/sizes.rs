@@ -113,6 +113,7 @@ pub fn recorded_field(
         Some(bytes) => bytes,
         None if catalog.job()?.is_imported() => {
             let (surface, sizes) = (shells(catalog, room)?, &options.mesh.sizes);
+            let _held = room.lease(surface.bytes());
             let (points, triangles) = (&surface.points, &surface.triangles);
             let extra = ExtraSizes::default();
             return Ok(SizeField::build_with(points, triangles, sizes, &extra, room)?.0);
