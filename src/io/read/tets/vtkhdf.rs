@@ -5,6 +5,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use hdf5_reader::group::Group;
 use hdf5_reader::{Dataset, FileStorage, Hdf5File, OpenOptions};
 
 use super::hdf_rows::kind;
@@ -52,26 +53,7 @@ fn pieces(file: &Hdf5File, place: &FilePlace) -> Result<Vec<Piece>> {
     };
     let n_points = counts("NumberOfPoints")?;
     let (n_cells, n_corners) = (counts("NumberOfCells")?, counts("NumberOfConnectivityIds")?);
-    let mut arrays = Vec::new();
-    for (section, path, name) in [
-        ("Points", "VTKHDF/Points", "Points"),
-        ("Cells", "VTKHDF/Connectivity", "connectivity"),
-        ("Cells", "VTKHDF/Offsets", "offsets"),
-        ("Cells", "VTKHDF/Types", "types"),
-    ] {
-        let dataset = file.dataset(path);
-        let dataset = dataset.map_err(|e| refuse(place, &format!("the array {path}"), &e))?;
-        arrays.extend(array(section, name.to_owned(), path.to_owned(), &dataset));
-    }
-    for section in ["PointData", "CellData"] {
-        let Ok(group) = root.group(section) else { continue };
-        let datasets = group.datasets().map_err(|e| refuse(place, section, &e))?;
-        for dataset in datasets {
-            let name = dataset.name().rsplit('/').next().unwrap_or_default().to_owned();
-            let path = format!("VTKHDF/{section}/{name}");
-            arrays.extend(array(section, name, path, &dataset));
-        }
-    }
+    let arrays = arrays(file, &root, place)?;
     if n_points.len() != n_cells.len() || n_points.len() != n_corners.len() {
         let (what, found) = ("partitions", format!("{} with cells", n_cells.len()));
         let declared = n_points.len().to_string();
@@ -97,12 +79,43 @@ fn pieces(file: &Hdf5File, place: &FilePlace) -> Result<Vec<Piece>> {
         let counts = [points, cells, corners, cells.saturating_add(1)];
         first = std::array::from_fn(|i| counts[i].saturating_add(first[i]));
     }
-    for ArrayAt { section, name, format, rows, .. } in &arrays {
+    check_rows(&arrays, first, place)?;
+    Ok(pieces)
+}
+
+/// All arrays of numbers of a file.
+fn arrays(file: &Hdf5File, root: &Group, place: &FilePlace) -> Result<Vec<ArrayAt>> {
+    let mut arrays = Vec::new();
+    for (section, path, name) in [
+        ("Points", "VTKHDF/Points", "Points"),
+        ("Cells", "VTKHDF/Connectivity", "connectivity"),
+        ("Cells", "VTKHDF/Offsets", "offsets"),
+        ("Cells", "VTKHDF/Types", "types"),
+    ] {
+        let dataset = file.dataset(path);
+        let dataset = dataset.map_err(|e| refuse(place, &format!("the array {path}"), &e))?;
+        arrays.extend(array(section, name.to_owned(), path.to_owned(), &dataset));
+    }
+    for section in ["PointData", "CellData"] {
+        let Ok(group) = root.group(section) else { continue };
+        let datasets = group.datasets().map_err(|e| refuse(place, section, &e))?;
+        for dataset in datasets {
+            let name = dataset.name().rsplit('/').next().unwrap_or_default().to_owned();
+            let path = format!("VTKHDF/{section}/{name}");
+            arrays.extend(array(section, name, path, &dataset));
+        }
+    }
+    Ok(arrays)
+}
+
+/// Compares the rows of all arrays with the points, cells, corners and offsets of all partitions.
+fn check_rows(arrays: &[ArrayAt], counts: [u64; 4], place: &FilePlace) -> Result<()> {
+    for ArrayAt { section, name, format, rows, .. } in arrays {
         let declared = match (section.as_str(), name.as_str()) {
-            ("Points" | "PointData", _) => first[0],
-            ("Cells", "connectivity") => first[2],
-            ("Cells", "offsets") => first[3],
-            _ => first[1],
+            ("Points" | "PointData", _) => counts[0],
+            ("Cells", "connectivity") => counts[2],
+            ("Cells", "offsets") => counts[3],
+            _ => counts[1],
         };
         if declared != *rows {
             let (what, found) = ("rows of an array", format!("{rows} in {format}"));
@@ -110,7 +123,7 @@ fn pieces(file: &Hdf5File, place: &FilePlace) -> Result<Vec<Piece>> {
             return Err(place.refuse(ReadFault::CountMismatch { what, declared, found }));
         }
     }
-    Ok(pieces)
+    Ok(())
 }
 
 /// An array as it is in the file; `None` for one that holds no numbers.

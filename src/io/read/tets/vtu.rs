@@ -376,26 +376,14 @@ impl Grid {
             let n = n.ok_or_else(|| self.expected(0, "offsets of cells that rise"))?;
             from = end;
             for k in 0..n as usize {
-                let v = vertices.integer()?;
-                let known = u64::try_from(v).ok().filter(|&v| v < piece.n_points);
-                let Some(v) = known else {
-                    let (low, high) = (0, piece.n_points as i64 - 1);
-                    let fault = ReadFault::IndexOutOfRange { index: v, low, high };
-                    return Err(vertices.place().refuse(fault));
-                };
+                let v = vertex(&mut vertices, piece.n_points)?;
                 if let Some(corner) = corners.get_mut(k) {
                     *corner = (v + first) as u32;
                 }
             }
             let (region, part) = (next(&mut regions)?, next(&mut parts)?);
             let (label, ghost) = (next(&mut labels)?, next(&mut ghosts)?);
-            row.clear();
-            for (field, numbers) in &mut values {
-                let field = &mesh.fields[*field];
-                for _ in 0..field.components {
-                    row.push(numbers.word(field.number)?);
-                }
-            }
+            read_row(&mut values, mesh, &mut row)?;
             if ghost & 1 != 0 {
                 n_ghosts += 1;
                 continue;
@@ -407,12 +395,7 @@ impl Grid {
                     let region = mesh.regions.number(region);
                     let part = if parts.is_some() { mesh.parts.number(part) } else { 0 };
                     mesh.tet(corners, region, part).map_err(|fault| types.place().refuse(fault))?;
-                    let mut words = row.iter();
-                    for (field, _) in &values {
-                        let field = &mut mesh.fields[*field];
-                        let own = words.by_ref().take(field.components as usize);
-                        own.for_each(|&word| field.words.push(word));
-                    }
+                    push_row(&values, mesh, &row);
                 }
                 (5, 3) | (22, 6) | (69, 3..) => {
                     mesh.n_curved += u64::from(n > 3);
@@ -432,6 +415,37 @@ impl Grid {
         let lists = lists.into_iter().flatten();
         lists.chain(values.into_iter().map(|(_, numbers)| numbers)).try_for_each(Numbers::end)?;
         Ok(n_ghosts)
+    }
+}
+
+/// The next vertex of a cell. Errors: the piece has no such vertex.
+fn vertex(vertices: &mut Numbers, n_points: u64) -> Result<u64> {
+    let index = vertices.integer()?;
+    let known = u64::try_from(index).ok().filter(|&v| v < n_points);
+    known.ok_or_else(|| {
+        let (low, high) = (0, n_points as i64 - 1);
+        vertices.place().refuse(ReadFault::IndexOutOfRange { index, low, high })
+    })
+}
+
+/// Reads the words of all fields of a cell.
+fn read_row(values: &mut [(usize, Numbers)], mesh: &RawMesh, row: &mut Vec<u64>) -> Result<()> {
+    row.clear();
+    for (field, numbers) in values {
+        let field = &mesh.fields[*field];
+        for _ in 0..field.components {
+            row.push(numbers.word(field.number)?);
+        }
+    }
+    Ok(())
+}
+
+/// Adds the words of a cell to their fields.
+fn push_row(values: &[(usize, Numbers)], mesh: &mut RawMesh, row: &[u64]) {
+    let mut words = row.iter();
+    for (field, _) in values {
+        let field = &mut mesh.fields[*field];
+        words.by_ref().take(field.components as usize).for_each(|&word| field.words.push(word));
     }
 }
 
