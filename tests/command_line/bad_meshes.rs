@@ -172,7 +172,7 @@ fn damaged_files() {
             "-2 declared",
             "line 11",
         ),
-        (good.replace("Tetrahedra\n2", "Tetrahedra\n3"), "count-mismatch", "3 declared", "line 14"),
+        (good.replace("Tetrahedra\n2", "Tetrahedra\n3"), "count-mismatch", "3 declared", "line 11"),
         (good.replace("2 5 1\nEnd\n", "2"), "count-mismatch", "2 declared", ""),
         (
             good.replace("Dimension 3", "Dimension 2"),
