@@ -1,6 +1,6 @@
 //! Where the parts of a surface came from.
 
-use crate::catalog::SurfaceSource;
+use crate::catalog::{Job, SurfaceSource};
 
 /// A part of a surface: its origin, and the fingerprint by which a changed file is noticed.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,6 +74,14 @@ const OPEN_PARTS: &str = "open-parts:";
 const EDGES: &str = "edges:";
 const POINTS: &str = "points:";
 const EMBEDDED_COPY: &str = "wires:";
+
+impl Job {
+    /// True if the mesh of the store was imported.
+    pub fn is_imported(&self) -> bool {
+        let mut sources = self.surfaces.iter().filter_map(Source::from_record);
+        sources.any(|source| matches!(source.origin, Origin::Imported(_)))
+    }
+}
 
 impl Source {
     /// A source without a fingerprint.

@@ -115,7 +115,9 @@ fn help_of(code: Code) -> &'static str {
             "a store is a directory that this program wrote; a surface is looked at by `tetdb check SURFACE`, and a new store takes another path"
         }
         Code::StoreExists => "choose another path, or replace it with --force",
-        Code::NoCoarseLeaf => "mesh the surface again without --drop-coarse",
+        Code::NoCoarseLeaf => {
+            "mesh the surface again without --drop-coarse; import an imported mesh again"
+        }
         Code::StoreUnfinished => "`tetdb resume STORE` continues it",
         Code::StoreFormat => "use the version of this program that wrote the store, or mesh again",
         Code::StoreRecipe => {

@@ -15,6 +15,7 @@ pub fn run(args: &ImportArgs, console: &Console) -> Result<u8, Failure> {
         .subdomains(args.subdomains.map_or(Subdomains::Auto, Subdomains::Exactly))
         .settings(settings.clone())
         .verify(!args.run.no_verify)
+        .fields(!args.no_fields)
         .existing(if args.force { Existing::Replace } else { Existing::Keep });
     if let Some(name) = &args.part_field {
         import = import.part_field(name);

@@ -24,6 +24,13 @@ fn medit(points: &str, tets: &[&str], triangles: &[&str]) -> String {
     text + &format!("Tetrahedra\n{}\n{lines}End\n", tets.len())
 }
 
+/// An array of NumPy.
+fn npy(kind: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
+    let head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape},)}}\n");
+    let length = (head.len() as u16).to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &length[..], head.as_bytes(), bytes].concat()
+}
+
 /// A store of two regions.
 fn balls(place: &Place) -> String {
     place
@@ -43,6 +50,8 @@ fn every_export_comes_back_with_its_digest() {
         ("d.msh", "--ascii"),
         ("e.msh", "--format msh22"),
         ("f.vtu", ""),
+        ("l.vtkhdf", ""),
+        ("m.vtkhdf", "--one-partition"),
         ("g.ele", ""),
         ("h.inp", ""),
         ("i.npy", ""),
@@ -67,10 +76,16 @@ fn sub_domains_are_those_of_planes_or_of_the_file() {
     let place = Place::new();
     let line = "mesh sample:box,h=0.045 -o a.tetdb --subdomains 2 --no-verify";
     place.run_line(line).succeeds();
-    place.run_line("export a.tetdb a.vtu a.msh a.npy").succeeds();
+    place.run_line("export a.tetdb a.vtu a.msh a.npy a.vtkhdf").succeeds();
     let digest = place.digest("a.tetdb");
-    for file in ["a.vtu", "a.msh", "a.npy"] {
-        let line = format!("import {file} -o b.tetdb --part-field subdomain --force");
+    for (file, name) in [
+        ("a.vtu", "subdomain"),
+        ("a.msh", "subdomain"),
+        ("a.npy", "subdomain"),
+        ("a.vtkhdf", "subdomain"),
+        ("a.vtkhdf", "partition"),
+    ] {
+        let line = format!("import {file} -o b.tetdb --part-field {name} --force");
         place.run_line(&line).succeeds();
         assert_eq!(place.digest("b.tetdb"), digest, "{file}");
     }
@@ -95,10 +110,150 @@ fn sub_domains_are_those_of_planes_or_of_the_file() {
     place.run_line("snapshot b.tetdb b.png").succeeds();
     place.run_line("report b.tetdb b.html").succeeds();
     place.run_line("field b.tetdb add t --at vertices --from x").succeeds();
-    let error = place.run_line("resaturate b.tetdb --subdomain 1 --json").error();
+    // What is on disk of a sub-domain that was never meshed here is all there is of it.
+    let error = place.run_line("resaturate b.tetdb --subdomain 1 --repair --json").error();
     assert_eq!(error["code"], "no-coarse-leaf");
-    assert!(error["message"].to_string().contains("imported"), "{error}");
     place.run_line("resume b.tetdb --no-verify").succeeds();
+}
+
+/// Sub-domains are meshed again from their shells, whatever threads and memory; undo brings back the file's mesh.
+#[test]
+fn imported_sub_domains_are_meshed_again() {
+    let place = Place::new();
+    balls(&place);
+    place.run_line("export a.tetdb a.vtu").succeeds();
+    for n in [1, 3] {
+        let import = format!("import a.vtu -o b.tetdb --subdomains {n} --force --no-verify");
+        let mut digests = Vec::new();
+        for limits in ["--threads 1 --memory 64MiB", "--threads 2 --memory 96MiB", ""] {
+            place.run_line(&import).succeeds();
+            let before = place.digest("b.tetdb");
+            place.run_line("field b.tetdb add t --at vertices --from x").succeeds();
+            let all: Vec<String> = (0..n).map(|rank: u32| rank.to_string()).collect();
+            let line = format!("resaturate b.tetdb --subdomain {} --refine-by 0.6", all.join(","));
+            let forecast = place.run_line(&format!("{line} --dry-run --json")).succeeds().json();
+            assert_eq!(forecast["subdomains"].as_array().map(Vec::len), Some(n as usize));
+            place.run_line(&format!("{line} {limits}")).succeeds();
+            digests.push(place.digest("b.tetdb"));
+            assert_ne!(digests[0], before);
+            place.run_line("verify b.tetdb --full").succeeds();
+            let info = place.run_line("info b.tetdb --json").succeeds().json();
+            let range = &info["fields"][0]["ranges"][0];
+            assert_eq!((&range["low"], &range["high"]), (&0.0.into(), &1.0.into()));
+            // Meshed anew from the snapshot that is there by now, it is the same.
+            place.run_line("resaturate b.tetdb --subdomain 0 --repair").succeeds();
+            assert_eq!(place.digest("b.tetdb"), digests[0]);
+            place.run_line("resaturate b.tetdb --undo").succeeds();
+            assert_eq!(place.digest("b.tetdb"), before);
+            let line = "resaturate b.tetdb --subdomain 0 --repair --json";
+            assert_eq!(place.run_line(line).error()["code"], "no-coarse-leaf");
+        }
+        assert!(digests.iter().all(|digest| *digest == digests[0]), "{n}: {digests:?}");
+    }
+    for sizes in ["", "--hsiz 0.1", "--size-sphere 0.5,0.5,0.5,0.2,0.05"] {
+        place.run_line(&format!("resaturate b.tetdb --subdomain 1 {sizes}")).succeeds();
+        place.run_line("verify b.tetdb --full").succeeds();
+    }
+}
+
+/// Parts of a file may touch themselves at edges and vertices, and lie in pieces.
+#[test]
+fn parts_that_touch_themselves_are_meshed_again() {
+    let place = Place::new();
+    place.run_line("mesh sample:box,h=0.25 -o a.tetdb --no-verify").succeeds();
+    place.run_line("export a.tetdb a.npy").succeeds();
+    let n = place.run_line("info a.tetdb --json").succeeds().json()["tets"].as_u64();
+    let n = n.expect("a number");
+    // Every third tetrahedron, but for a few: nearly none has a neighbor in its part.
+    let parts: Vec<u8> = (0..n).map(|t| (t * t % 7 % 3) as u8).collect();
+    place.write("a_p.npy", npy("|u1", &n.to_string(), &parts));
+    place.run_line("import a.npy -o b.tetdb --part-field p").succeeds();
+    place.run_line("resaturate b.tetdb --subdomain 0,1,2 --refine-by 0.4").succeeds();
+    place.run_line("verify b.tetdb --full").succeeds();
+}
+
+#[test]
+fn an_imported_mesh_is_adapted_to_a_field() {
+    let place = Place::new();
+    place.run_line("mesh sample:box,h=0.12 -o a.tetdb --no-verify").succeeds();
+    place.run_line("export a.tetdb a.meshb").succeeds();
+    place.run_line("import a.meshb -o b.tetdb --subdomains 3 --no-verify").succeeds();
+    place.run_line("field b.tetdb add t --at vertices --from exp(-50*(x-0.5)^2)").succeeds();
+    let before = place.digest("b.tetdb");
+    place.run_line("adapt b.tetdb --field t --factor 3").succeeds();
+    assert_ne!(place.digest("b.tetdb"), before);
+    place.run_line("verify b.tetdb --full").succeeds();
+}
+
+/// Values at vertices and tetrahedra become fields, equal to the last bit.
+#[test]
+fn arrays_of_values_become_fields() {
+    let place = Place::new();
+    balls(&place);
+    for line in [
+        "a --at vertices --from x*x+y",
+        "u --at vertices --from x,y,z --type f32",
+        "k --at tets --from region*7 --type i32",
+        "b --at tets --from floor(x*1000) --type i64",
+        "m --at tets --from x,y,z,y,x,z,z,x,y",
+        "s --at vertices --from x,y,z,y,z,x",
+    ] {
+        place.run_line(&format!("field a.tetdb add {line}")).succeeds();
+    }
+    let fields = |store: &str| {
+        let info = place.run_line(&format!("info {store} --json")).succeeds().json();
+        let list = info["fields"].as_array().expect("a list").iter();
+        let mut list: Vec<String> = list
+            .map(|f| {
+                format!(
+                    "{} {} {} {} {}",
+                    f["name"], f["type"], f["at"], f["components"], f["digest"]
+                )
+            })
+            .collect();
+        list.sort();
+        list
+    };
+    let expected = fields("a.tetdb");
+    assert_eq!(expected.len(), 6);
+    place.run_line("export a.tetdb b.vtu b.vtkhdf b.npy").succeeds();
+    for file in ["b.vtu", "b.vtkhdf", "b.npy"] {
+        for memory in ["64MiB", "1GiB"] {
+            place
+                .run_line(&format!("import {file} -o b.tetdb --force --memory {memory}"))
+                .succeeds();
+            assert_eq!(fields("b.tetdb"), expected, "{file}");
+        }
+        let note =
+            place.run_line(&format!("import {file} -o b.tetdb --force --subdomains 3")).succeeds();
+        assert!(note.stderr().contains("left out: global_id"), "{}", note.stderr());
+        place.run_line("verify b.tetdb --full").succeeds();
+        let condition = "abs(k - region * 7) + abs(m.xx - x) + abs(m.yy - x) > 0";
+        let line = ["query", "b.tetdb", "--where", condition, "--json"];
+        let done = place.run(&line).succeeds();
+        let wrong = format!("{}{}", done.stdout(), done.stderr());
+        assert!(wrong.contains("\"found\":0"), "{wrong}");
+        place.run_line(&format!("import {file} -o b.tetdb --force --no-fields")).succeeds();
+        assert!(fields("b.tetdb").is_empty());
+    }
+}
+
+#[test]
+fn values_of_gmsh_become_fields() {
+    let place = Place::new();
+    place.write("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n9 0 0 -1\n$EndNodes\n\
+        $Elements\n3\n1 2 2 1 1 1 2 3\n2 4 2 1 1 1 2 3 4\n7 4 2 1 1 1 3 2 9\n$EndElements\n\
+        $NodeData\n1\n\"temp\"\n1\n0.0\n3\n0\n1\n5\n1 1.5\n2 2.5\n3 -7\n4 4\n9 5\n$EndNodeData\n\
+        $ElementData\n1\n\"vel\"\n1\n0.0\n3\n0\n3\n3\n2 1 2 3\n7 4 5 6\n1 0 0 0\n$EndElementData\n\
+        $NodeData\n1\n\"some\"\n0\n3\n0\n1\n1\n1 1.5\n$EndNodeData\n");
+    let done = place.run_line("import a.msh").succeeds();
+    assert!(done.stderr().contains("arrays of values were left out: some"), "{}", done.stderr());
+    let info = place.run_line("info a.tetdb --json").succeeds().json();
+    let fields = &info["fields"];
+    assert_eq!((&fields[0]["name"], &fields[0]["values"]), (&"temp".into(), &5.into()));
+    assert_eq!(fields[0]["ranges"][0]["low"], -7.0);
+    assert_eq!((&fields[1]["name"], &fields[1]["components"]), (&"vel".into(), &3.into()));
+    assert_eq!(fields[1]["ranges"][2]["high"], 6.0);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The program as its users see it: processes, files, exit codes.
 
 mod adapt;
+mod bad_meshes;
 mod cells;
 mod check;
 mod closed;

@@ -65,7 +65,7 @@ pub enum Command {
     /// Take over a tetrahedral mesh that another program made
     ///
     /// The mesh is checked: each tetrahedron positive, faces shared as wholes. No vertex moves; vertices at one place are joined, unused
-    /// ones left out. The store is finished: `query`, `verify`, `export` and all else that needs no coarse mesh work on it.
+    /// ones left out. The store is finished: all that works on a mesh of tetdb works on it, `resaturate` and `adapt` too.
     Import(ImportArgs),
     /// Predict a mesh and the memory, disk and time it takes, without meshing
     ///

@@ -245,7 +245,7 @@ pub(super) fn journal(
 }
 
 /// Writes the values of a field and lists them in one commit.
-fn add(
+pub(super) fn add(
     catalog: &mut Catalog,
     settings: &Settings,
     mut field: FieldRow,

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::field_spec::NewField;
+use super::fields;
 use super::mesher::verify_new;
 use super::preflight::{scratch_beside, with_free_space};
 use super::store::say_how_locked;
@@ -9,11 +11,12 @@ use super::surface::source;
 use super::{
     Bytes, Error, Existing, Mesher, Settings, Store, Subdomains, Surface, guarded, job, replace,
 };
-use crate::pipeline::{self, MeshOptions, PipelineError};
+use crate::pipeline::{self, MeshOptions, PipelineError, StoreValues};
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface;
-use tetdb_io::read::{MeshFields, RawMesh, read_tets, tets_file};
+use tetdb_io::read::{MeshFields, RawField, RawMesh, read_tets, tets_file};
 use tetdb_schema::code::Code;
+use tetdb_schema::field::{FieldNumber, FieldPlace};
 use tetdb_schema::source::{Origin, Source};
 use tetdb_store::store::{Catalog, StoreError};
 
@@ -21,7 +24,8 @@ use tetdb_store::store::{Catalog, StoreError};
 ///
 /// The mesh is checked: every tetrahedron has an exactly positive volume, and two tetrahedra share a whole face, an edge, a vertex or
 /// nothing. No vertex moves and no tetrahedron is changed. Boundary, faces between regions and labelled triangles are the store's surface.
-/// The store is finished, and everything works on it that needs no coarse mesh.
+/// The store is finished, and everything works on it that works on a mesh of ours. [`Store::remesh`] starts from the faces around a
+/// sub-domain and its regions.
 ///
 /// ```no_run
 /// # use tetdb_engine::api as tetdb;
@@ -37,6 +41,7 @@ pub struct Import {
     settings: Settings,
     existing: Existing,
     verify: bool,
+    fields: bool,
 }
 
 impl Import {
@@ -50,6 +55,7 @@ impl Import {
             settings: Settings::new(),
             existing: Existing::default(),
             verify: true,
+            fields: true,
         }
     }
 
@@ -59,7 +65,8 @@ impl Import {
         self
     }
 
-    /// Takes the sub-domains from this array of the file's cells, in place of planes. In Gmsh files it is the partition, under any name.
+    /// Takes the sub-domains from this array of the file's cells, in place of planes. In Gmsh files it is the partition, under
+    /// any name; `partition` is that of a .vtkhdf file.
     pub fn part_field(mut self, name: impl Into<String>) -> Self {
         self.part_field = Some(name.into());
         self
@@ -95,6 +102,12 @@ impl Import {
         self
     }
 
+    /// Sets whether arrays of values become fields of the store. Default: true.
+    pub fn fields(mut self, fields: bool) -> Self {
+        self.fields = fields;
+        self
+    }
+
     /// Imports into a new store at `path` and opens it. An interrupted import leaves no store.
     ///
     /// # Errors
@@ -125,8 +138,11 @@ impl Import {
         let origin = self.origin()?;
         let scratch = scratch_beside(&surface::Surface::default(), cap / 16 * 7, path)?;
         let mut raw = RawMesh::new(scratch.clone());
-        let fields =
-            MeshFields { part: self.part_field.as_deref(), region: self.region_field.as_deref() };
+        let fields = MeshFields {
+            part: self.part_field.as_deref(),
+            region: self.region_field.as_deref(),
+            values: self.fields.then_some(may_be_field as fn(&str) -> bool),
+        };
         read_tets(&self.file, fields, &mut raw).map_err(in_terms_of_meshes)?;
         let subdomains = self.subdomains.count();
         let watch = settings.watcher();
@@ -146,7 +162,9 @@ impl Import {
                 pipeline::write_placed(&mut catalog, placed, &surface.inner, &scratch, &watch)
             });
             let written = written.map_err(Error::from)?;
-            written.map_err(|e| with_free_space(e.into(), &new, None))
+            let values = written.map_err(|e| with_free_space(e.into(), &new, None))?;
+            attempt(|| add_values(&mut catalog, settings, values))?
+                .map_err(|e| with_free_space(e, &new, None))
         });
         if let Err(error) = written {
             drop(catalog);
@@ -188,6 +206,45 @@ impl Import {
             _ => error,
         }
     }
+}
+
+/// Names of columns that exports write and the store has anyway.
+const EXPORTED: [&str; 4] = ["global_id", "vertex_id", "input_id", "label"];
+
+/// Returns whether an array of this name may be a field.
+fn may_be_field(name: &str) -> bool {
+    let new = NewField::new(name, FieldPlace::Vertices);
+    !EXPORTED.contains(&name) && new.row(FieldNumber::F64, 1).is_ok()
+}
+
+/// Makes fields of the values of the file.
+fn add_values(
+    catalog: &mut Catalog,
+    settings: &Settings,
+    values: StoreValues,
+) -> Result<(), Error> {
+    let StoreValues { fields, mut order } = values;
+    for RawField { name, place, number, components, words } in fields {
+        let row = NewField::new(&name, place).row(number, components)?;
+        let (order, mut words) =
+            (&mut order[usize::from(place == FieldPlace::Tets)], words.finish());
+        let mut next = 0;
+        fields::add(catalog, settings, row, &mut |mesh, chunk| {
+            let count = match place {
+                FieldPlace::Tets => mesh.tet_summaries()[chunk as usize].count,
+                FieldPlace::Vertices => mesh.vertex_summaries()[chunk as usize].count,
+            } as usize;
+            let n = components as usize;
+            let mut chunk = Vec::with_capacity(count * n);
+            for i in next..next + count {
+                let first = order.get(i) as usize * n;
+                (first..first + n).for_each(|k| chunk.push(words.get(k)));
+            }
+            next += count;
+            Ok(chunk)
+        })?;
+    }
+    Ok(())
 }
 
 /// Replaces help for surfaces by help for meshes.

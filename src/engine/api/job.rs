@@ -14,7 +14,7 @@ use tetdb_base::surface::{self, SeedKind};
 use tetdb_io::read::{FileSizes, read_sizes, size_files};
 use tetdb_kernel::boundary::RegionPolicy;
 use tetdb_kernel::sizing::{Background, BackgroundMesh, Length, RegionSize};
-use tetdb_schema::source::{Origin, Source};
+use tetdb_schema::source::Source;
 use tetdb_store::store::Catalog;
 
 /// Builds the job record of a run.
@@ -24,12 +24,6 @@ pub fn job(options: &MeshOptions, surfaces: &[Source]) -> Job {
         surfaces: surfaces.iter().map(Source::to_record).collect(),
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
     }
-}
-
-/// Returns whether a store has a mesh that was imported.
-pub fn is_imported(job: &Job) -> bool {
-    let mut sources = job.surfaces.iter().filter_map(Source::from_record);
-    sources.any(|source| matches!(source.origin, Origin::Imported(_)))
 }
 
 /// The recorded options of a store. Errors: `damaged`.

@@ -12,7 +12,6 @@ use super::store::{open_finished, open_to_change};
 use super::{Error, Settings, Sizes, Store, Surface, TransferredField, guarded, job, verify};
 use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Values};
 use tetdb_schema::catalog::SubdomainRow;
-use tetdb_schema::code::Code;
 use tetdb_store::audit::Level;
 use tetdb_store::store::{BEFORE, Catalog, StoreError, WriterLock};
 
@@ -280,16 +279,9 @@ impl Remesh {
     }
 }
 
-/// The options of a store with coarse meshes. Errors: it was imported.
+/// The recorded options of a store. Errors: damage.
 pub(super) fn recorded_options(open: &mut Catalog, path: &Path) -> Result<Options, Error> {
-    let job = open.job()?;
-    if job::is_imported(&job) {
-        let message = "the store was imported: its sub-domains have no coarse meshes from which they could be meshed again";
-        return Err(Error::new(Code::NoCoarseLeaf, message)
-            .at(path.display())
-            .with_help("mesh its surface anew: it is surface.obj in the store"));
-    }
-    Ok(Options::from(job::options_of(&job, path)?))
+    Ok(Options::from(job::options_of(&open.job()?, path)?))
 }
 
 impl Remeshed {

@@ -8,7 +8,8 @@ use serde_json::json;
 use super::mesher::predict;
 use super::preflight::scratch_beside;
 use super::{Code, Error, Settings, Sizes, Surface, job};
-use crate::pipeline::{MeshOptions, NewSizes, Options, OptionsText, SizeFile, Values};
+use crate::pipeline::{self, MeshOptions, NewSizes, Options, OptionsText, SizeFile, Values};
+use tetdb_base::storage::attempt;
 use tetdb_io::read::read_lengths;
 use tetdb_kernel::sizing::{Length, SizeField, SizeOptions, SizingError};
 use tetdb_store::store::{Catalog, StoreError};
@@ -107,7 +108,8 @@ fn field(
     Ok((Some(field_of_surface(open, &all, settings)?), requested))
 }
 
-/// The size field of the surface that a store was made from, with these options. Errors: a changed surface.
+/// The size field of the surface that a store was made from, or of the shells of an imported one, with these options. Errors: a changed
+/// surface.
 fn field_of_surface(
     open: &mut Catalog,
     all: &Options,
@@ -115,9 +117,13 @@ fn field_of_surface(
 ) -> Result<SizeField, Error> {
     let (dir, cap) = (open.dir().to_owned(), settings.cap()?);
     let scratch = scratch_beside(&tetdb_base::surface::Surface::default(), cap, &dir)?;
-    let surface = Surface::of_record(&open.job()?.surfaces, &dir, &scratch)?;
+    let job = open.job()?;
+    let surface = match job.is_imported() {
+        true => attempt(|| pipeline::shells(open, &scratch))??,
+        false => Surface::of_record(&job.surfaces, &dir, &scratch)?.inner,
+    };
     drop(scratch);
-    let prepared = predict(&surface.inner, all, cap, &dir)?;
+    let prepared = predict(&surface, all, cap, &dir)?;
     settings.note(prepared.sizes.to_string());
     Ok(prepared.field)
 }

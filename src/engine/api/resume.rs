@@ -46,7 +46,7 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
     let lock = catalog.lock().expect("it is open for writing");
     let job = catalog.job()?;
     if !catalog.state()?.is_finished() {
-        if job::is_imported(&job) {
+        if job.is_imported() {
             let message = "an import was interrupted, and cannot be continued";
             return Err(Error::new(Code::StoreUnfinished, message)
                 .at(place.display())

@@ -32,7 +32,7 @@ pub use adapt::{
     AdaptForecast, AdaptPlan, AdaptRequest, ErrorEstimate, LongFaces, plan_adaptation,
 };
 pub use error::PipelineError;
-pub use import::{BadMesh, Placed, place, write as write_placed};
+pub use import::{BadMesh, Placed, StoreValues, place, write as write_placed};
 pub use mesh::coarse_mesh;
 pub use mesh::{CoarseReport, HeadStart, Summary, head_start, mesh, mesh_prepared};
 pub use plan::{
@@ -44,7 +44,7 @@ pub use progress::silent;
 pub use progress::{Event, Watcher};
 pub use remesh::{
     FieldChange, Forecast, NewSizes, ResaturateSummary, Resaturated, Resaturation, Values, changed,
-    forecast, forget, previous, recorded_request, resaturate, restore,
+    forecast, forget, previous, recorded_request, resaturate, restore, shells,
 };
 pub use tasks::serve;
 pub use tasks::{

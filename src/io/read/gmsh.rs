@@ -14,6 +14,7 @@ use super::{ReadFault, Result, SurfaceSink};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::NoteKind;
+use tetdb_schema::field::FieldPlace;
 
 /// State of a reader that all sections of a file share.
 pub(super) struct GmshReader<'a, 'b, R> {
@@ -46,6 +47,8 @@ pub(super) struct GmshReader<'a, 'b, R> {
     /// Partition of each volume entity (4), and that of the current element; 0 for none.
     pub(super) partitions: HashMap<i64, i64>,
     pub(super) partition: i64,
+    /// Number of the current element.
+    pub(super) element: i64,
 }
 
 /// A version of the format.
@@ -86,6 +89,7 @@ impl<'a, 'b, R: BufRead> GmshReader<'a, 'b, R> {
             tets: None,
             partitions: HashMap::new(),
             partition: 0,
+            element: 0,
         })
     }
 }
@@ -176,6 +180,12 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 }
                 (b"$NodeData", _) if self.node_data.as_ref().is_some_and(HashMap::is_empty) => {
                     self.read_node_data()?;
+                }
+                (b"$NodeData", V2 | V40 | V41) if self.tets.is_some() => {
+                    self.read_values(FieldPlace::Vertices, "$EndNodeData")?;
+                }
+                (b"$ElementData", V2 | V40 | V41) if self.tets.is_some() => {
+                    self.read_values(FieldPlace::Tets, "$EndElementData")?;
                 }
                 (b"$NOD", V1) => self.read_nodes_2(false, "$ENDNOD")?,
                 (b"$ELM", V1) => self.read_elements_2_text("$ENDELM")?,
@@ -272,7 +282,8 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
     ) -> Result<()> {
         if let Some(sink) = &mut self.tets {
             let names = [&self.names, &self.volume_names];
-            return sink.element(kind, tags, (groups, names), self.partition, &self.numbers.feed);
+            let numbers = [self.element, self.partition];
+            return sink.element(kind, tags, (groups, names), numbers, &self.numbers.feed);
         }
         let ElementType { n_nodes, n_corners, role } = kind;
         self.n_thin += u64::from(role == Role::Thin);
@@ -453,7 +464,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             let is_inside = dimension == 2 && self.inside.contains(&entity);
             for k in 0..n {
                 self.numbers.need_record("elements", n, k)?;
-                self.tag()?;
+                self.element = self.tag()?;
                 let mut tags = [0; 8];
                 for j in 0..kind.n_nodes {
                     let tag = self.tag()?;

@@ -45,6 +45,16 @@ impl<R: BufRead> GmshNumbers<R> {
         })
     }
 
+    /// A number of any size, which may be infinite or none.
+    pub fn value(&mut self) -> Result<f64> {
+        if !self.binary {
+            self.feed.need_word("a value")?;
+            return self.feed.parse("a value");
+        }
+        let bytes = self.feed.bytes::<8>()?;
+        Ok(if self.big { f64::from_be_bytes(bytes) } else { f64::from_le_bytes(bytes) })
+    }
+
     /// Compares a declared count with the bytes left, at `words` numbers of `bytes` each.
     pub fn check_count(
         &self,

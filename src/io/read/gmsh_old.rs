@@ -82,7 +82,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
         let n = self.text_count("elements", 4, 2)?;
         for i in 0..n {
             self.numbers.need_record("elements", n, i)?;
-            self.numbers.int()?;
+            self.element = self.numbers.int()?;
             let kind = self.numbers.int()?;
             match self.version {
                 Version::V1 => {
@@ -122,7 +122,7 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 ));
             }
             for _ in 0..in_block {
-                self.numbers.int()?;
+                self.element = self.numbers.int()?;
                 self.read_element_2(kind, n_tags)?;
             }
             done += in_block;

@@ -62,7 +62,7 @@ use open::{is_binary_stl, open, stem, unpacked_name};
 pub use point_table::{PointColumns, PointRow, PointTable};
 use sink::SurfaceSink;
 pub use sizes::{FileSizes, read_sizes, size_files};
-pub use tets::{Groups, MeshFields, RawMesh, read_tets, tets_file};
+pub use tets::{Groups, MeshFields, RawField, RawMesh, read_tets, tets_file};
 use volume_cells::VolumeCells;
 
 use tetdb_base::storage::ScratchSpace;

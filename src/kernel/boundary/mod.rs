@@ -53,7 +53,7 @@ pub use nearness::{Nearness, NearnessKind};
 pub use policy::{Filled, RegionPolicy, Walls};
 pub use recover::recover;
 pub use recover::recover_with_progress;
-pub use regions::{RegionSummary, VolumeRegions, fill_regions};
+pub use regions::{RegionSummary, VolumeRegions, fill_by_sides, fill_regions};
 pub use report::RecoveryReport;
 pub use seeds::RegionRule;
 

@@ -98,6 +98,31 @@ pub fn fill_regions<P: Pages>(
     Ok(regions)
 }
 
+/// Gives every volume the region that `sides` names in front of and behind its facets, and deletes those of region 0 and the enclosing box.
+///
+/// No facet is of a sheet. Effects: as [`fill_regions`]. Returns false if two facets name different regions of one volume, or a region
+/// outside. Errors: a facet is no face of the mesh.
+pub fn fill_by_sides<P: Pages>(
+    mesh: &mut Mesh<P>,
+    sides: &dyn Fn(u32) -> [u32; 2],
+) -> Result<bool, BoundaryError> {
+    let mut flood = Flood::run(mesh);
+    note_components(mesh, &mut flood)?;
+    let mut number = vec![NONE; flood.components.len()];
+    number[OUTSIDE as usize] = 0;
+    for n in 0..mesh.n_facets() {
+        for (component, region) in mesh.facet(n).regions.into_iter().zip(sides(n)) {
+            let known = &mut number[component as usize];
+            if ![NONE, region].contains(known) {
+                return Ok(false);
+            }
+            *known = region;
+        }
+    }
+    apply(mesh, &number, &mut VolumeRegions::default());
+    Ok(true)
+}
+
 /// Notes on both sides of every facet which component lies there.
 fn note_components<P: Pages>(
     mesh: &mut Mesh<P>,

@@ -1,6 +1,7 @@
 //! Faces the mesh must keep: triangles of the input, and faces on interfaces.
 
 use tetdb_schema::page::u32_le;
+use tetdb_schema::tree::IdCounts;
 
 use super::cursor::Mesh;
 use super::sparse;
@@ -75,6 +76,11 @@ impl<P: Pages> Mesh<P> {
         Self::take_id::<{ kind::FACETS }>(&mut self.pages, &mut self.state.facets, "facets");
         self.set_facet(n, f);
         n
+    }
+
+    /// Forgets the facets from number `n` on.
+    pub fn truncate_facets(&mut self, n: u32) {
+        self.state.facets = IdCounts::without_gaps(n.min(self.n_facets()));
     }
 
     // ----- interface faces --------------------------------------------------------------------

@@ -25,7 +25,7 @@ pub use bit_set::BitSet;
 pub use coarse_snapshot::{CoarseSnapshot, CoarseWriter};
 pub use error::SealedError;
 pub use face_join::{FaceJoin, FaceJoinSorter, JoinedFace};
-pub use face_pairs::{FacePairs, Paired, face_of, sorted_face};
+pub use face_pairs::{FacePairs, Paired, face_of, sorted_face, sorted_faces};
 pub use field::{FieldColumn, FieldFile, FieldWriter};
 pub use form::Form;
 pub use merge_reader::MergeReader;

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use tetdb_schema::chunk::TetSummary;
 use tetdb_schema::digest::Digest;
-use tetdb_schema::record::{FACES, SealedTet};
+use tetdb_schema::record::SealedTet;
 
-use super::{Corner, FacePairs, Paired, Shape, quality_bin, sorted_face};
+use super::{Corner, FacePairs, Paired, Shape, quality_bin, sorted_faces};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::map_into;
 use tetdb_schema::catalog::QUALITY_BINS;
@@ -115,8 +115,7 @@ pub(super) fn count_open(pairs: &mut FacePairs, tets: &[SealedTet]) -> u32 {
     pairs.clear();
     let mut open = 0u32;
     for tet in tets {
-        for corners in FACES {
-            let (face, odd) = sorted_face(corners.map(|i| tet.nodes[i]));
+        for (_, face, odd) in sorted_faces(tet.nodes) {
             match pairs.add(face, odd, 0) {
                 Paired::With(_) => open -= 1,
                 Paired::Open => open += 1,

@@ -129,25 +129,26 @@ pub fn mesh(
     watched(py, &token, Some(&listener), work)
 }
 
-/// Imports a mesh file into a new store. `how`: number of sub-domains, array of parts, array of regions.
+/// Imports a mesh file into a new store. `how`: number of sub-domains, array of parts, array of regions, whether values become fields.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "called by the Python half alone")]
 pub fn import_mesh(
     py: Python<'_>,
     file: PathBuf,
     path: PathBuf,
-    how: (Option<u32>, Option<String>, Option<String>),
+    how: (Option<u32>, Option<String>, Option<String>, bool),
     settings: SettingWords,
     replace: bool,
     verify: bool,
     callable: Option<Py<PyAny>>,
 ) -> PyResult<()> {
     let (token, board) = (CancelToken::new(), Arc::new(Board::default()));
-    let (subdomains, parts, regions) = how;
+    let (subdomains, parts, regions, fields) = how;
     let mut import = Import::new(file)
         .subdomains(subdomains.map_or(Subdomains::Auto, Subdomains::Exactly))
         .settings(settings.settings(&token, Some(&board)))
         .existing(if replace { Existing::Replace } else { Existing::Keep })
+        .fields(fields)
         .verify(verify);
     if let Some(name) = parts {
         import = import.part_field(name);

@@ -68,6 +68,17 @@ def test_gmsh_files_are_read(tmp_path: pathlib.Path, version: float, binary: int
         assert store.n_tets == len(tags[0])
 
 
+def test_values_come_back(tmp_path: pathlib.Path) -> None:
+    with tetdb.mesh(tetdb.sample("box,h=0.3"), tmp_path / "a.tetdb") as store:
+        store.fields["T"] = np.arange(float(store.n_tets))
+        values = store.fields["T"].array()
+        store.export(tmp_path / "a.vtu")
+    with tetdb.import_mesh(tmp_path / "a.vtu", tmp_path / "b.tetdb") as store:
+        assert np.array_equal(store.fields["T"].array(), values)
+    with tetdb.import_mesh(tmp_path / "a.vtu", tmp_path / "c.tetdb", fields=False) as store:
+        assert list(store.fields) == []
+
+
 def test_tetgen_meshes_are_read(tmp_path: pathlib.Path) -> None:
     tetgen = pytest.importorskip("tetgen", reason="tetgen makes the mesh")
     pyvista = pytest.importorskip("pyvista", reason="pyvista writes the file")

@@ -68,14 +68,20 @@ impl MeshArrays {
         let whole = recorded_field(catalog, options, scratch)?;
         let recorded = Recorded { whole: &whole, room: scratch };
         let (mut parts, mut n_tets, mut n_vertices) = (Vec::new(), 0, 0);
+        let is_imported = catalog.job()?.is_imported();
         for row in catalog.subdomains()? {
             let (tets, vertices) = (row.tets as usize, row.vertices as usize);
             let coarse = catalog.coarse_snapshot(row.rank)?;
-            let coarse = coarse.ok_or_else(|| StoreError::NoCoarseSnapshot {
-                path: catalog.dir().to_owned(),
-                subdomain: row.rank,
-            })?;
-            let (least_tets, first_tet, first_vertex) = (coarse.tets, n_tets, n_vertices);
+            let least_tets = match coarse {
+                Some(coarse) => coarse.tets,
+                // It is made when the sub-domain is first meshed again.
+                None if is_imported => 0,
+                None => {
+                    let (path, subdomain) = (catalog.dir().to_owned(), row.rank);
+                    return Err(StoreError::NoCoarseSnapshot { path, subdomain }.into());
+                }
+            };
+            let (first_tet, first_vertex) = (n_tets, n_vertices);
             parts.push(MeshPart { row, least_tets, first_tet, first_vertex });
             (n_tets, n_vertices) = (n_tets + tets, n_vertices + vertices);
         }

@@ -43,10 +43,21 @@ impl BadMesh {
 
     /// Adds an element with its corners; `number` counts from 0.
     pub fn add(&mut self, kind: &str, number: u64, corners: &[Point]) {
+        self.add_place(|| {
+            let corners: Vec<String> = corners.iter().map(|&p| show(p)).collect();
+            format!("{kind} {}: {}", number + 1, corners.join(" "))
+        });
+    }
+
+    /// Adds an element described by its place.
+    pub fn add_place(&mut self, place: impl FnOnce() -> String) {
         self.n += 1;
         if self.places.len() < PLACES_MAX {
-            let corners: Vec<String> = corners.iter().map(|&p| show(p)).collect();
-            self.places.push(format!("{kind} {}: {}", number + 1, corners.join(" ")));
+            let place = place();
+            // Two tetrahedra may have several faces that meet at one place.
+            if !self.places.contains(&place) {
+                self.places.push(place);
+            }
         }
     }
 

@@ -10,9 +10,9 @@ use tetdb_base::storage::{ScratchSpace, Sorter, SpillVec, SpillVecBuilder, check
 use tetdb_base::surface::SurfaceBuilder;
 use tetdb_schema::page::NONE;
 use tetdb_schema::record::{FACES, SealedTet};
-use tetdb_store::sealed::{BitSet, FacePairs, Paired, sorted_face};
+use tetdb_store::sealed::{BitSet, FacePairs, Paired, sorted_face, sorted_faces};
 
-const CONFORM_HELP: &str = "repair the mesh where it comes from: two tetrahedra share a whole face, an edge, a vertex or nothing";
+pub const CONFORM_HELP: &str = "repair the mesh where it comes from: two tetrahedra share a whole face, an edge, a vertex or nothing";
 
 /// Tetrahedra with their sub-domains, and what is collected while their faces are matched.
 struct Matching<'a> {
@@ -67,6 +67,7 @@ pub fn match_faces(
         shared,
         on_surface,
         kept: kept.finish(),
+        values: file.values,
     })
 }
 
@@ -108,7 +109,10 @@ impl Matching<'_> {
 
     /// Sets the sub-domain of each tetrahedron and matches the faces within some thousands at a time; the others go to the sort.
     fn take_tets(&mut self, watch: &Watcher) -> Result<(), PipelineError> {
-        let n = self.tets.len();
+        let (n, is_whole) = (self.tets.len(), self.parts_of.count() == 1);
+        if is_whole {
+            self.first_part.fill(0);
+        }
         let mut pairs = FacePairs::new(AT_ONCE);
         let mut some = Vec::new();
         for from in (0..n).step_by(AT_ONCE) {
@@ -120,21 +124,24 @@ impl Matching<'_> {
             for t in from..n.min(from + AT_ONCE) {
                 let [a, b, c, d, region, group] = self.tets.get(t);
                 let nodes = [a, b, c, d];
-                let corners = nodes.map(|v| self.point(v));
-                let part = self.parts_of.of(group, &corners);
-                self.tets.set(t, [a, b, c, d, region, part]);
+                let points = &mut self.vertices.points;
+                let corners = || nodes.map(|v| Point::from_array(points.get(v as usize)));
+                let part = self.parts_of.of(group, corners);
+                if part != group {
+                    self.tets.set(t, [a, b, c, d, region, part]);
+                }
                 some.push((nodes, region, part));
                 let rotated = SealedTet { nodes, region }.rotated().nodes;
-                self.order.push(PartTet { part, nodes: rotated, region })?;
-                for v in nodes {
+                self.order.push(PartTet { part, nodes: rotated, region, tet: t as u32 })?;
+                // Of a single sub-domain nothing is shared.
+                for v in nodes.into_iter().filter(|_| !is_whole) {
                     match self.first_part.get(v as usize) {
                         NONE => self.first_part.set(v as usize, part),
                         first if first == part => {}
                         _ => self.shared.push(SharedVertex { vertex: v, part })?,
                     }
                 }
-                for (i, corners) in FACES.into_iter().enumerate() {
-                    let (face, odd) = sorted_face(corners.map(|k| nodes[k]));
+                for (i, face, odd) in sorted_faces(nodes) {
                     let side = FaceSide { face, is_tet: true, odd, of: (t << 2 | i) as u32 };
                     if face.into_iter().all(|v| self.marked.contains(v.into())) {
                         self.sides.push(side)?;

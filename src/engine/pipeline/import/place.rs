@@ -11,7 +11,8 @@ use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::geom::{Aabb, HilbertFrame, Point, counted, orient};
 use tetdb_base::storage::{KeyedId, ScratchSpace, Sorter, SpillVec, check_cancelled, map_into};
 use tetdb_base::surface::Surface;
-use tetdb_io::read::Groups;
+use tetdb_io::read::{Groups, RawField};
+use tetdb_schema::field::FieldPlace;
 use tetdb_schema::ids::SubdomainId;
 use tetdb_schema::page::NONE;
 
@@ -48,6 +49,15 @@ pub struct Placed {
     /// Number in the surface of each vertex, or [`NONE`].
     pub(super) on_surface: SpillVec<u32>,
     pub(super) kept: SpillVec<Kept>,
+    pub(super) values: FileValues,
+}
+
+/// Values of the file at its vertices and tetrahedra.
+pub struct FileValues {
+    /// In the order of the file.
+    pub fields: Vec<RawField>,
+    /// The vertex of the file that stands for each vertex, in the new order; empty where there are no fields.
+    pub vertices: SpillVec<u32>,
 }
 
 /// Triangles of the file, and what else is kept of it.
@@ -57,6 +67,7 @@ pub struct FileTriangles {
     pub triangles: SpillVec<[u32; 4]>,
     pub labels: Groups,
     pub stem: String,
+    pub values: FileValues,
 }
 
 /// Vertices in their new order.
@@ -67,19 +78,22 @@ pub struct Vertices {
     pub bounds: Aabb,
 }
 
-/// Renumbers the used vertices; returns the used regions too. Errors: a vertex that is not there.
+/// Renumbers the used vertices; returns the used regions and the values too. Errors: a vertex that is not there.
 pub fn renumber(
     raw: &mut SpillVec<[f64; 3]>,
     tets: &mut SpillVec<[u32; 6]>,
+    mut fields: Vec<RawField>,
     space: &ScratchSpace,
     notes: &mut Vec<String>,
-) -> Result<(Vertices, BTreeSet<u32>), PipelineError> {
+) -> Result<(Vertices, BTreeSet<u32>, FileValues), PipelineError> {
     let n = raw.len();
     let mut new_of = space.vec(n, NONE);
-    let mut regions = BTreeSet::new();
+    let (mut regions, mut last_region) = (BTreeSet::new(), None);
     for t in 0..tets.len() {
         let [corners @ .., region, _] = tets.get(t);
-        regions.insert(region);
+        if last_region.replace(region) != Some(region) {
+            regions.insert(region);
+        }
         if let Some(v) = corners.into_iter().find(|&v| v as usize >= n) {
             let what =
                 format!("a tetrahedron names vertex {}, and there are {n}", u64::from(v) + 1);
@@ -104,7 +118,8 @@ pub fn renumber(
         }
     }
     let mut points = space.builder_within(space.available() / 4);
-    let (mut n_used, mut last_key) = (0, None);
+    let mut old_of = space.builder_within(space.available() / 16);
+    let (mut n_used, mut n_differ, mut last_key) = (0, 0, None);
     // Vertices of one place of the curve by their coordinates.
     let mut alike: HashMap<[u64; 3], u32> = HashMap::new();
     for record in sorter.finish()? {
@@ -115,10 +130,14 @@ pub fn renumber(
             alike.clear();
             last_key = Some(key);
         }
-        let new = *alike.entry(p.map(f64::to_bits)).or_insert_with(|| {
+        let fresh = points.len() as u32;
+        let new = *alike.entry(p.map(f64::to_bits)).or_insert(fresh);
+        if new == fresh {
             points.push(p);
-            points.len() as u32 - 1
-        });
+            old_of.push(if fields.is_empty() { NONE } else { id });
+        } else if differ(&mut fields, [old_of.get(new as usize), id]) {
+            n_differ += 1;
+        }
         new_of.set(id as usize, new);
     }
     for (k, text) in [
@@ -127,12 +146,23 @@ pub fn renumber(
             n_used - points.len(),
             "[vertex repeats|vertices repeat] the coordinates of another and [was|were] joined to it",
         ),
+        (n_differ, "joined [vertex has|vertices have] other values; the first of the file count"),
     ] {
         if k > 0 {
             notes.push(counted(k as u64, text));
         }
     }
-    Ok((Vertices { points: points.finish(), new_of, bounds }, regions))
+    let values = FileValues { fields, vertices: old_of.finish() };
+    Ok((Vertices { points: points.finish(), new_of, bounds }, regions, values))
+}
+
+/// Returns whether two vertices of the file have different values.
+fn differ(fields: &mut [RawField], vertices: [u32; 2]) -> bool {
+    fields.iter_mut().filter(|field| field.place == FieldPlace::Vertices).any(|field| {
+        let n = field.components as usize;
+        let [a, b] = vertices.map(|v| v as usize * n);
+        (0..n).any(|k| field.words.get(a + k) != field.words.get(b + k))
+    })
 }
 
 /// The new number of each group, and number and name of each region. Numbers of the file are kept if they can be.
@@ -203,10 +233,11 @@ impl Parts {
     }
 
     /// The sub-domain of a tetrahedron with this part of the file and these corners.
-    pub fn of(&self, group: u32, corners: &[Point; 4]) -> u32 {
+    pub fn of(&self, group: u32, corners: impl FnOnce() -> [Point; 4]) -> u32 {
         match self {
             Self::OfFile(ranks) => ranks[group as usize],
-            Self::Planes(_, planes) => planes.as_ref().map_or(0, |p| p.part(middle(corners))),
+            Self::Planes(1, _) => 0,
+            Self::Planes(_, planes) => planes.as_ref().map_or(0, |p| p.part(middle(&corners()))),
         }
     }
 }

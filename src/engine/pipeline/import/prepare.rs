@@ -2,6 +2,7 @@
 
 use super::BadMesh;
 use super::faces::match_faces;
+use super::overlap;
 use super::place::{FileTriangles, Parts, Placed, Placing, region_numbers, renumber};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::Watcher;
@@ -18,7 +19,18 @@ pub fn place(
     space: &ScratchSpace,
     watch: &Watcher,
 ) -> Result<Placed, PipelineError> {
-    let RawMesh { stem, points, tets, triangles, regions, labels, parts: groups, notes, .. } = mesh;
+    let RawMesh {
+        stem,
+        points,
+        tets,
+        triangles,
+        regions,
+        labels,
+        parts: groups,
+        notes,
+        fields,
+        ..
+    } = mesh;
     let (mut raw_points, mut raw_tets) = (points.finish(), tets.finish());
     if raw_tets.is_empty() {
         let what = "the file holds no tetrahedra";
@@ -26,7 +38,8 @@ pub fn place(
         return Err(BadMesh::new(what, help).into());
     }
     let mut notes = notes;
-    let (vertices, used) = renumber(&mut raw_points, &mut raw_tets, space, &mut notes)?;
+    let (vertices, used, values) =
+        renumber(&mut raw_points, &mut raw_tets, fields, space, &mut notes)?;
     drop(raw_points);
     let (region_rank, regions) = region_numbers(&regions, &used);
     let mut placing =
@@ -35,6 +48,8 @@ pub fn place(
     drop(raw_tets);
     let Placing { vertices, parts_of, .. } = placing;
     let triangles = triangles.finish();
-    let file = FileTriangles { triangles, labels, stem, regions, notes };
-    match_faces(vertices, tets, parts_of, file, space, watch)
+    let file = FileTriangles { triangles, labels, stem, regions, notes, values };
+    let mut placed = match_faces(vertices, tets, parts_of, file, space, watch)?;
+    overlap::check(&mut placed, space)?;
+    Ok(placed)
 }

@@ -9,6 +9,8 @@ sort_record! {
         /// Rotated so that the least comes first.
         pub nodes: [u32; 4],
         pub region: u32,
+        /// Its number in the file.
+        pub tet: u32,
     }
 }
 

@@ -14,9 +14,10 @@ use crate::pipeline::progress::{Event, Watcher};
 use crate::pipeline::seal::totals::{journal, totals_of};
 use crate::pipeline::tree;
 use tetdb_base::storage::{
-    DiskPath, ScratchSpace, Sorted, SpillVec, StorageError, check_cancelled,
+    DiskPath, ScratchSpace, Sorted, SpillVec, SpillVecBuilder, StorageError, check_cancelled,
 };
 use tetdb_base::surface::Surface;
+use tetdb_io::read::RawField;
 use tetdb_kernel::topology::NeighborCounts;
 use tetdb_schema::blob::{Blob, BlobContent};
 use tetdb_schema::catalog::{RegionRow, StoreState};
@@ -28,8 +29,8 @@ use tetdb_schema::unsealed::TetLinks;
 use tetdb_store::sealed::{Form, Sealed, SealedWriter, sorted_face};
 use tetdb_store::store::{Catalog, INPUT_TRIANGLES};
 
-/// Generation of the files.
-const GENERATION: u32 = 1;
+/// Generation of the files. No later mesh of a sub-domain has it.
+pub const GENERATION: u32 = 1;
 
 /// The numbers that name a face of an interface.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -41,6 +42,14 @@ struct InCut {
 
 const NO_CUT: InCut = InCut { cut: 0, index: 0 };
 
+/// Values of the file, and their order in the store.
+pub struct StoreValues {
+    /// In the order of the file.
+    pub fields: Vec<RawField>,
+    /// The vertex and the tetrahedron of the file for each in the order of the sub-domains.
+    pub order: [SpillVec<u32>; 2],
+}
+
 struct Writing<'a> {
     placed: Placed,
     /// The surface after its triangles were oriented.
@@ -51,10 +60,12 @@ struct Writing<'a> {
     names: SpillVec<u64>,
     in_cut: SpillVec<InCut>,
     local: SpillVec<u32>,
+    /// The vertex and tetrahedron of the file for each in the order of the store; empty where the file has no values.
+    order: [SpillVecBuilder<u32>; 2],
     space: &'a ScratchSpace,
 }
 
-/// Writes a placed mesh into a new store and seals it. `surface` is that of the mesh, its triangles turned at most.
+/// Writes a placed mesh into a new store and seals it; returns the values of the file. `surface` is that of the mesh, its triangles turned at most.
 ///
 /// Errors: the disk. Unwinds where a scratch file fails.
 pub fn write(
@@ -63,7 +74,7 @@ pub fn write(
     surface: &Surface,
     space: &ScratchSpace,
     watch: &Watcher,
-) -> Result<(), PipelineError> {
+) -> Result<StoreValues, PipelineError> {
     let clock = Instant::now();
     let (n, n_vertices, n_kept) = (placed.n_parts, placed.points.len(), placed.kept.len());
     let mut writing = Writing {
@@ -73,6 +84,7 @@ pub fn write(
         names: space.vec(n_vertices, u64::MAX),
         in_cut: space.vec(n_kept, NO_CUT),
         local: space.vec(n_vertices, NONE),
+        order: [(); 2].map(|()| space.builder_within(space.available() / 16)),
         space,
     };
     let vertices = writing.name_vertices()?;
@@ -94,9 +106,10 @@ pub fn write(
     for table in owners.values() {
         table.faces.iter().for_each(|&[low, high]| neighbors.add(low, high));
     }
-    let Writing { placed, .. } = writing;
+    let Writing { placed, order, .. } = writing;
     commit(catalog, &placed, surface, &sealed, (&owners, &neighbors), labels, clock)?;
-    close(catalog, n)
+    close(catalog, n)?;
+    Ok(StoreValues { fields: placed.values.fields, order: order.map(SpillVecBuilder::finish) })
 }
 
 fn commit(
@@ -235,6 +248,7 @@ impl Writing<'_> {
         let mut writer = SealedWriter::create_as(Form::Packed, path, id, GENERATION, memory)?;
         self.vertices(id, &mut streams.vertices, &mut writer)?;
         let mut kept = self.space.sorter_within(self.space.cap() / 8);
+        let has_values = !self.placed.values.fields.is_empty();
         let (mut done, is_here) =
             (0u32, |t: &Result<PartTet, StorageError>| t.as_ref().map_or(true, |t| t.part == rank));
         loop {
@@ -247,6 +261,7 @@ impl Writing<'_> {
                 unit: "records",
             });
             let (local, sides, tets) = (&mut self.local, &mut streams.sides, &mut streams.tets);
+            let order = &mut self.order[1];
             let mut some = std::iter::from_fn(|| tets.next_if(is_here)).take(AT_ONCE).map(|tet| {
                 let tet: PartTet = tet?;
                 let nodes = tet.nodes.map(|v| local.get(v as usize));
@@ -258,6 +273,9 @@ impl Writing<'_> {
                     let vertices = self.placed.kept.get(number as usize);
                     let (face, _) = sorted_face([0, 1, 2].map(|i| local.get(vertices[i] as usize)));
                     kept.push(KeptSide { face, kept: number, behind, tet: done })?;
+                }
+                if has_values {
+                    order.push(tet.tet);
                 }
                 done += 1;
                 let place = TetLinks { neighbors: [NONE; 4], required: 0, flags: 0 };
@@ -301,6 +319,9 @@ impl Writing<'_> {
             };
             let point = self.placed.points.get(v as usize);
             writer.push_vertex(SealedVertex { point, h: 0.0, tag, id })?;
+            if !self.placed.values.fields.is_empty() {
+                self.order[0].push(self.placed.values.vertices.get(v as usize));
+            }
             local += 1;
         }
         Ok(())

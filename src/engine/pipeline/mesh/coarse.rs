@@ -61,6 +61,24 @@ pub fn recovered<P: Pages>(
     options: &Options,
     watch: &Watcher,
 ) -> Result<CoarseReport, PipelineError> {
+    let (recovery, regions) = recovered_and_colored(mesh, watch, |mesh| {
+        let regions = fill_regions(mesh, &options.mesh.regions)?;
+        match mesh.n_tets() {
+            0 => Err(PipelineError::NothingFilled {
+                policy: options.mesh.regions.policy.word().to_owned(),
+            }),
+            _ => Ok(regions),
+        }
+    })?;
+    Ok(CoarseReport { kernel, recovery, regions })
+}
+
+/// Recovers the facets of a Delaunay mesh of their vertices, lets `color` keep what they enclose, and restores the Delaunay property.
+pub fn recovered_and_colored<P: Pages, T>(
+    mesh: &mut Mesh<P>,
+    watch: &Watcher,
+    color: impl FnOnce(&mut Mesh<P>) -> Result<T, PipelineError>,
+) -> Result<(RecoveryReport, T), PipelineError> {
     watch(stage("recover the surface"));
     mesh.refresh_tet_of();
     let recovery = recover_with_progress(mesh, &|done, total| {
@@ -72,18 +90,13 @@ pub fn recovered<P: Pages>(
         });
     })?;
     watch(stage("color the regions"));
-    let regions = fill_regions(mesh, &options.mesh.regions)?;
-    if mesh.n_tets() == 0 {
-        return Err(PipelineError::NothingFilled {
-            policy: options.mesh.regions.policy.word().to_owned(),
-        });
-    }
+    let colored = color(mesh)?;
     if recovery.missing_segments + recovery.missing_facets > 0 {
         // Recovery leaves the mesh non-Delaunay. In a Delaunay mesh, inserted points have smaller cavities: dividing a scanned
         // surface's mesh takes an eighth less time.
         optimize::run(mesh, optimize::Mode::None, &|p| watch(p.into()));
     }
-    Ok(CoarseReport { kernel, recovery, regions })
+    Ok((recovery, colored))
 }
 
 fn stage(stage: &'static str) -> Event {

@@ -2,12 +2,15 @@
 //!
 //! Workers write new files next to the old ones. When all are done, one commit lists the new files and keeps the old as the
 //! previous version. A killed run leaves either the old mesh or the new one.
+//!
+//! An imported store has no coarse snapshots: those that are needed are made before, from the shells of the sub-domains.
 
 use std::collections::BTreeSet;
 
+use super::coarse::add_snapshots;
 use super::request::Resaturation;
-use super::run::{RemeshRun, recorded_field, room};
-use super::sizes::{NewSizes, Recorded};
+use super::run::RemeshRun;
+use super::sizes::{NewSizes, Recorded, recorded_field, room};
 use super::summary::{Forecast, ResaturateSummary};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
@@ -28,6 +31,10 @@ pub fn resaturate(
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<ResaturateSummary, PipelineError> {
+    // A damaged file has no shell from which its sub-domain could be meshed.
+    if !what.repair {
+        add_snapshots(catalog, options, &what.ranks, budget, watch)?;
+    }
     let mut again = RemeshRun::open(catalog, options, what, budget)?;
     attempt(|| {
         let fields = again.fields(budget)?;

@@ -6,9 +6,10 @@ use std::time::Instant;
 
 use super::fields::FieldChanges;
 use super::request::Resaturation;
-use super::sizes::{Recorded, Values, predicted};
+use super::sizes::{Recorded, Values, predicted, recorded_field, room};
 use super::summary::{Forecast, ResaturateSummary, Resaturated};
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::import::GENERATION;
 use crate::pipeline::plan::{Options, Plan, REFUSED_BELOW};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::{journal, sum_totals, totals_of};
@@ -19,7 +20,7 @@ use crate::pipeline::work::soundness::{check_owners, panic_is_damage_of};
 use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::workers::{WorkerFn, map_bounded};
 use tetdb_base::geom::{Aabb, Point};
-use tetdb_base::storage::{Backing, Budget, DiskPath, ScratchSpace, attempt, available_bytes};
+use tetdb_base::storage::{Backing, Budget, DiskPath, attempt, available_bytes};
 use tetdb_kernel::mesh::Workspace;
 use tetdb_kernel::sizing::{BackgroundMesh, SizeField};
 use tetdb_schema::blob::{Blob, BlobContent};
@@ -27,7 +28,7 @@ use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow, VersionRow};
 use tetdb_schema::field::FieldPart;
 use tetdb_schema::row::RowKind;
 use tetdb_schema::topology::FaceOwners;
-use tetdb_schema::tree::SubtreeMesh;
+use tetdb_schema::tree::{MeshState, RankRange, SubtreeMesh};
 use tetdb_store::sealed::SealedError;
 use tetdb_store::sealed::{CoarseSnapshot, Form};
 use tetdb_store::store::{BEFORE, Catalog, StoreError};
@@ -40,7 +41,9 @@ pub struct RemeshRun<'a> {
     /// The recorded size field of the whole mesh.
     pub field: Arc<SizeField>,
     /// Rows of the sub-domains to remesh, by rank.
-    rows: Vec<(SubdomainRow, CoarseRow)>,
+    rows: Vec<(SubdomainRow, Option<CoarseRow>)>,
+    /// True if the store was imported: a sub-domain may have no coarse snapshot yet.
+    is_imported: bool,
     /// The latest generation of each sub-domain's files.
     last: BTreeMap<u32, u32>,
     /// Number of recorded steps. New generations depend on it, so that none occurs twice, not even that of a file that was
@@ -93,14 +96,16 @@ impl<'a> RemeshRun<'a> {
         budget: &Budget,
     ) -> Result<Self, PipelineError> {
         let clock = Instant::now();
-        let mut rows = Vec::new();
+        let (mut rows, is_imported) = (Vec::new(), catalog.job()?.is_imported());
         for &rank in &what.ranks {
             let row = catalog.subdomain(rank)?;
             let kept = catalog.coarse_snapshot(rank)?;
-            let kept = kept.ok_or_else(|| StoreError::NoCoarseSnapshot {
-                path: catalog.dir().to_owned(),
-                subdomain: rank,
-            })?;
+            // The mesh of the file is not that of the snapshot made later.
+            let is_of_file = is_imported && row.generation == GENERATION;
+            if is_of_file && what.repair || kept.is_none() && !is_imported {
+                let (path, subdomain) = (catalog.dir().to_owned(), rank);
+                return Err(StoreError::NoCoarseSnapshot { path, subdomain }.into());
+            }
             rows.push((row, kept));
         }
         let mut last = BTreeMap::new();
@@ -117,6 +122,7 @@ impl<'a> RemeshRun<'a> {
             options,
             what,
             rows,
+            is_imported,
             clock,
         })
     }
@@ -163,11 +169,12 @@ impl<'a> RemeshRun<'a> {
         const POINT: u64 = 24 + 40;
         const FACE: u64 = 12;
         const LEAF: u64 = 16;
-        let one = |(row, kept): &(SubdomainRow, CoarseRow)| {
+        let one = |(row, kept): &(SubdomainRow, Option<CoarseRow>)| {
             let [low, high] = row.bounds.map(Point::from_array);
             let leaves = self.field.n_leaves_in(&Aabb { low, high }) as u64;
-            let faces = kept.facets + kept.interface_faces;
-            let skin = POINT * kept.vertices + FACE * faces + LEAF * leaves;
+            let faces = row.facets + row.interface_faces;
+            let vertices = kept.map_or(faces.min(row.vertices), |kept| kept.vertices);
+            let skin = POINT * vertices + FACE * faces + LEAF * leaves;
             match values {
                 Some(Values::Nearest(_)) => skin + BackgroundMesh::bytes(row.vertices, 0),
                 Some(_) => skin + BackgroundMesh::bytes(row.vertices, row.tets),
@@ -223,7 +230,7 @@ impl<'a> RemeshRun<'a> {
 
     /// Refuses new files that the disk is not expected to hold; the old ones stay until the commit, and as a version after it.
     fn check_disk(&self, forecast: &[Forecast]) -> Result<(), PipelineError> {
-        let of = |((row, _), new): (&(SubdomainRow, CoarseRow), &Forecast)| {
+        let of = |((row, _), new): (&(SubdomainRow, _), &Forecast)| {
             row.bytes as f64 * new.predicted / row.tets.max(1) as f64
         };
         let needed: f64 = self.rows.iter().zip(forecast).map(of).sum();
@@ -264,7 +271,6 @@ impl<'a> RemeshRun<'a> {
         let bounds = tree::bounds(self.catalog)?;
         let workers = plan.workers().min(self.rows.len()).max(1);
         let share = plan.shared_by(workers as u64).without_file();
-        let meshes = tree::subtrees(self.catalog, self.n)?;
         let whole = Arc::clone(&self.field);
         let common = Common::new(self.options, &whole, bounds);
         let mut state = (self, BTreeMap::new());
@@ -274,7 +280,7 @@ impl<'a> RemeshRun<'a> {
             fields.into_iter().collect(),
             &vec![run as WorkerFn<RemeshJob, Box<FinishedSubdomain>>; workers],
             watch,
-            |(again, _), (rank, field)| again.job(meshes[rank as usize], field, share),
+            |(again, _), (rank, field)| again.job(rank, field, share),
             |(_, finished), subdomain| {
                 finished.insert(subdomain.sealed.row.rank, *subdomain);
                 Ok(())
@@ -287,30 +293,40 @@ impl<'a> RemeshRun<'a> {
 
     fn job(
         &mut self,
-        mesh: SubtreeMesh,
+        rank: u32,
         field: Option<SizeField>,
         share: Plan,
     ) -> Result<RemeshJob, PipelineError> {
-        let rank = mesh.ranks.first;
+        let ranks = RankRange { first: rank, count: 1 };
         let mut owners = BTreeMap::new();
-        for cut in mesh.ranks.cuts_above(self.n) {
-            let table: FaceOwners = read_blob(self.catalog, Blob::FaceOwners(cut))?;
-            owners.insert(cut, table.across(rank));
+        for cut in ranks.cuts_above(self.n) {
+            // Cuts of an imported store may have no faces.
+            if !self.is_imported || self.catalog.blob(Blob::FaceOwners(cut))?.is_some() {
+                let table: FaceOwners = read_blob(self.catalog, Blob::FaceOwners(cut))?;
+                owners.insert(cut, table.across(rank));
+            }
         }
-        // Interface faces stay. A sub-domain with a field of its own may be refined up to them.
-        let zones = match field {
-            Some(_) => Vec::new(),
-            None => tree::zones_above(self.catalog, mesh.ranks, self.n)?,
+        // Interface faces stay. A sub-domain with a field of its own may be refined up to them, as may any between which no cut was made.
+        let zones = match field.is_some() || self.is_imported {
+            true => Vec::new(),
+            false => tree::zones_above(self.catalog, ranks, self.n)?,
         };
         let found = self.rows.iter().find(|(row, _)| row.rank == rank);
         let (row, kept) = found.expect("requested");
-        let (row, kept) = (row.clone(), *kept);
+        let (row, kept) = (row.clone(), kept.expect("made before the run"));
         let last = self.last.get(&rank).copied().unwrap_or(0);
         let generation = last + 2 + 2 * self.steps;
         let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
         scratch.create_dir_all()?;
         let subdomain = SubdomainJob {
-            mesh,
+            // The snapshot has its own counts.
+            mesh: SubtreeMesh {
+                ranks,
+                generation,
+                state: MeshState::default(),
+                extents: Default::default(),
+                load: 0.0,
+            },
             base: self.catalog.coarse_path(rank, kept.generation),
             sealed: self.catalog.file_path(rank, generation),
             generation,
@@ -451,28 +467,6 @@ impl<'a> RemeshRun<'a> {
         }
         summary
     }
-}
-
-/// Scratch space with the remaining budget, for arrays of size fields.
-pub fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, PipelineError> {
-    // A store without the writer's lock may be on a read-only disk.
-    let folder = match catalog.lock() {
-        Some(_) => catalog.scratch_dir()?,
-        None => std::env::temp_dir().into(),
-    };
-    Ok(ScratchSpace::new(budget.available(), folder))
-}
-
-/// Reads the recorded size field of the whole mesh.
-pub fn recorded_field(
-    catalog: &mut Catalog,
-    options: &Options,
-    room: &ScratchSpace,
-) -> Result<SizeField, PipelineError> {
-    let bytes = catalog.blob(Blob::SizeField)?.unwrap_or_default();
-    let diagonal = tree::bounds(catalog)?.diagonal();
-    let field = SizeField::from_bytes_in(&bytes, room)?;
-    Ok(field.with_sources(&options.mesh.sizes, diagonal)?)
 }
 
 /// Returns whether fields have values on this mesh, now or in a version. They lie as its chunks do.

@@ -1,14 +1,17 @@
 //! Size fields of remeshed sub-domains.
 
+use super::shell::{Shell, shells};
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::Options;
+use crate::pipeline::tree;
 use tetdb_schema::blob::Blob;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::{Catalog, StoreError};
 
 use tetdb_base::geom::Point;
-use tetdb_base::storage::{FrozenSpillVec, ScratchSpace, check_cancelled};
+use tetdb_base::storage::{Budget, FrozenSpillVec, ScratchSpace, check_cancelled};
 use tetdb_kernel::sizing::{
-    BackgroundMesh, SizeConstraint, SizeField, SizingError, TETS_PER_LOAD, load_of_tet,
+    BackgroundMesh, ExtraSizes, SizeConstraint, SizeField, SizingError, TETS_PER_LOAD, load_of_tet,
 };
 
 /// Relative difference below which sizes count as equal for `--changed`. Where two fields have different cells, their values
@@ -88,6 +91,38 @@ impl SizeConstraint for Wanted<'_> {
             ([had, new], _) => had.and(new),
         }
     }
+}
+
+/// Scratch space with the remaining budget, for arrays of size fields.
+pub fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, PipelineError> {
+    // A store without the writer's lock may be on a read-only disk.
+    let folder = match catalog.lock() {
+        Some(_) => catalog.scratch_dir()?,
+        None => std::env::temp_dir().into(),
+    };
+    Ok(ScratchSpace::new(budget.available(), folder))
+}
+
+/// Reads the recorded size field of the whole mesh. That of an imported store comes from the edges of all shells.
+pub fn recorded_field(
+    catalog: &mut Catalog,
+    options: &Options,
+    room: &ScratchSpace,
+) -> Result<SizeField, PipelineError> {
+    let bytes = match catalog.blob(Blob::SizeField)? {
+        Some(bytes) => bytes,
+        None if catalog.job()?.is_imported() => {
+            let (surface, sizes) = (shells(catalog, room)?, &options.mesh.sizes);
+            let _held = room.lease(surface.bytes());
+            let (points, triangles) = (&surface.points, &surface.triangles);
+            let extra = ExtraSizes::default();
+            return Ok(SizeField::build_with(points, triangles, sizes, &extra, room)?.0);
+        }
+        None => Vec::new(),
+    };
+    let diagonal = tree::bounds(catalog)?.diagonal();
+    let field = SizeField::from_bytes_in(&bytes, room)?;
+    Ok(field.with_sources(&options.mesh.sizes, diagonal)?)
 }
 
 /// Size fields as recorded in the catalog.
@@ -272,6 +307,10 @@ fn skin(
     rank: u32,
     memory: u64,
 ) -> Result<(Vec<Point>, Vec<[u32; 3]>), PipelineError> {
+    if catalog.coarse_snapshot(rank)?.is_none() {
+        let shell = Shell::read(&mut catalog.open_subdomain(rank, (memory / 2) as usize)?)?;
+        return Ok((shell.points(), shell.triangles));
+    }
     let mut leaf = catalog.open_coarse(rank, (memory / 2) as usize)?;
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     for chunk in leaf.vertices() {

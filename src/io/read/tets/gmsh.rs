@@ -3,7 +3,7 @@
 use std::io::BufRead;
 
 use super::gmsh_sink::TetSink;
-use super::raw::{Groups, NodeNumbers, RawMesh};
+use super::raw::{Groups, MeshFields, NodeNumbers, RawMesh};
 use super::{Feed, Result};
 use crate::read::SurfaceSink;
 use crate::read::gmsh::GmshReader;
@@ -11,14 +11,22 @@ use crate::read::volume_cells::VolumeCells;
 use tetdb_base::geom::counted;
 use tetdb_base::surface::SurfaceBuilder;
 
-/// Reads a file. With `has_parts`, partitions are parts.
-pub fn read<R: BufRead>(feed: Feed<R>, has_parts: bool, mesh: &mut RawMesh) -> Result<()> {
+/// Reads a file. Partitions are parts if parts are asked for.
+pub fn read<R: BufRead>(feed: Feed<R>, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
+    let has_parts = fields.part.is_some();
     let mut builder = SurfaceBuilder::new();
     let (stem, cells) = (mesh.stem.clone(), VolumeCells::default());
     let mut none = SurfaceSink { builder: &mut builder, stem, prefix: None, cells };
     let mut reader = GmshReader::open(feed, &mut none)?;
-    let nodes = NodeNumbers::default();
-    reader.tets = Some(TetSink { mesh, nodes, has_parts, last: None, n_repeated: 0 });
+    reader.tets = Some(TetSink {
+        mesh,
+        nodes: NodeNumbers::default(),
+        elements: NodeNumbers::default(),
+        takes: fields.values,
+        has_parts,
+        last: None,
+        n_repeated: 0,
+    });
     reader.read_sections()?;
     let Some(TetSink { mesh, n_repeated, .. }) = reader.tets else { return Ok(()) };
     if n_repeated > 0 {

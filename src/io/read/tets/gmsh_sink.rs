@@ -12,6 +12,10 @@ use tetdb_base::geom::Point;
 pub struct TetSink<'a> {
     pub(in crate::read) mesh: &'a mut RawMesh,
     pub(super) nodes: NodeNumbers,
+    /// Numbers of the elements that are tetrahedra.
+    pub(super) elements: NodeNumbers,
+    /// Chooses the values that are taken, by name.
+    pub(super) takes: Option<fn(&str) -> bool>,
     pub(super) has_parts: bool,
     /// The last tetrahedron: versions 1 and 2 repeat it for each of its groups.
     pub(super) last: Option<([i64; 4], i64)>,
@@ -40,7 +44,7 @@ impl TetSink<'_> {
         ElementType { n_nodes, n_corners, role }: ElementType,
         tags: &[i64; 8],
         (groups, names): (&[i64], [&HashMap<i64, String>; 2]),
-        partition: i64,
+        [number, partition]: [i64; 2],
         feed: &Feed<R>,
     ) -> Result<()> {
         let mesh = &mut *self.mesh;
@@ -74,6 +78,9 @@ impl TetSink<'_> {
                 let region = mesh.regions.with_name(group, || name(group, 3));
                 let part = if self.has_parts { mesh.parts.number(partition) } else { 0 };
                 mesh.tet(corners, region, part).map_err(|fault| feed.refuse(fault))?;
+                if self.takes.is_some() {
+                    self.elements.push(number, &mesh.space);
+                }
             }
             _ => {
                 let what = format!("a mesh with elements of {n_corners} corners");

@@ -5,7 +5,9 @@
 
 mod abaqus;
 mod gmsh;
+mod gmsh_data;
 mod gmsh_sink;
+mod hdf_rows;
 mod medit;
 mod npy;
 mod numbers;
@@ -13,6 +15,7 @@ mod raw;
 #[cfg(test)]
 mod tests;
 mod tetgen;
+mod vtkhdf;
 mod vtu;
 
 use std::path::Path;
@@ -22,10 +25,10 @@ use super::open::open;
 use super::{FilePlace, Format, ReadError, ReadFault, Result};
 pub(super) use gmsh_sink::TetSink;
 pub use npy::tets_file;
-pub use raw::{Groups, MeshFields, RawMesh};
+pub use raw::{Groups, MeshFields, RawField, RawMesh};
 
 const ENDINGS: ReadFault = ReadFault::UnknownFormat(
-    "name the file .mesh, .meshb, .msh, .vtu, .ele, .inp or .npy after what it holds, with .gz or .zst behind it where it is packed",
+    "name the file .mesh, .meshb, .msh, .vtu, .vtkhdf, .ele, .inp or .npy after what it holds, with .gz or .zst behind it where it is packed",
 );
 
 /// Reads the mesh in a file into the memory and scratch files of `mesh`.
@@ -37,8 +40,10 @@ pub fn read_tets(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<
     let format = Format::from_extension(path);
     let limit = mesh.space.cap() / 4;
     mesh.stem = super::stem(path);
-    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npy")) {
-        npy::read(path, fields, mesh)?;
+    let is = |ending| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
+    if is("npy") || is("vtkhdf") {
+        let read = if is("npy") { npy::read } else { vtkhdf::read };
+        read(path, fields, mesh)?;
         mesh.end();
         return Ok(());
     }
@@ -57,7 +62,7 @@ pub fn read_tets(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<
     match format {
         Some(Format::Medit) => medit::read(open(path, limit)?, false, mesh)?,
         Some(Format::MeditBinary) => medit::read(open(path, limit)?, true, mesh)?,
-        Some(Format::Gmsh) => gmsh::read(open(path, limit)?, fields.part.is_some(), mesh)?,
+        Some(Format::Gmsh) => gmsh::read(open(path, limit)?, fields, mesh)?,
         Some(Format::VtkXml) => vtu::read(path, fields, mesh)?,
         Some(Format::TetgenEle) => tetgen::read(path, limit, mesh)?,
         Some(Format::Abaqus) => abaqus::read(open(path, limit)?, mesh)?,

@@ -3,12 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::numbers::{Coding, Layout, Numbers};
+use super::numbers::{Coding, Layout, Numbers, field_number};
 use super::{FilePlace, MeshFields, RawMesh, ReadFault, Result};
 use crate::read::error::Spot;
 use crate::read::feed::check_point;
 use crate::read::lengths::{ArrayFile, sides_of};
 use tetdb_base::geom::Point;
+use tetdb_schema::field::FieldPlace;
 
 /// The file of tetrahedra of a mesh that is named by one of its arrays, or by their common beginning.
 pub fn tets_file(path: &Path) -> PathBuf {
@@ -29,6 +30,7 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
         check_point(p, points.place())?;
         mesh.point(p);
     }
+    points.end()?;
     let (n, mut corners) = array(&tets, 4)?;
     let column = |name: Option<&str>, default: &str, n: u64| -> Result<Option<Numbers>> {
         let path = beside(name.unwrap_or(default));
@@ -59,6 +61,8 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
         let taken = mesh.tet([a?, b?, c?, d?], region, part);
         taken.map_err(|fault| corners.place().refuse(fault))?;
     }
+    [regions, parts].into_iter().flatten().chain([corners]).try_for_each(Numbers::end)?;
+    values(&tets, &base, [n_points, n], fields, mesh)?;
     let triangles = beside("triangles");
     if triangles.is_file() {
         let (n, mut corners) = array(&triangles, 3)?;
@@ -69,7 +73,56 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
             let label = mesh.labels.number(next(&mut labels)?);
             mesh.triangle(corners, label);
         }
+        labels.into_iter().chain([corners]).try_for_each(Numbers::end)?;
     }
+    Ok(())
+}
+
+/// Arrays beside that have a row for each vertex, or for each tetrahedron; which is known where these are not equally many.
+fn values(
+    tets: &Path,
+    base: &str,
+    counts: [u64; 2],
+    fields: MeshFields,
+    mesh: &mut RawMesh,
+) -> Result<()> {
+    let folder = tets.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let listed = std::fs::read_dir(folder.unwrap_or(Path::new(".")));
+    let listed =
+        listed.map_err(|e| FilePlace::new(tets).refuse(ReadFault::Unreadable(e.to_string())))?;
+    let mut names: Vec<String> =
+        listed.flatten().filter_map(|file| file.file_name().into_string().ok()).collect();
+    names.sort();
+    let mut left_out = Vec::new();
+    for file in &names {
+        let name = file.strip_prefix(base).and_then(|rest| rest.strip_prefix('_'));
+        let Some(name) = name.and_then(|rest| rest.strip_suffix(".npy")) else { continue };
+        let own = ["points", "tets", "triangles", "region", "label"];
+        if own.contains(&name) || [fields.part, fields.region].contains(&Some(name)) {
+            continue;
+        }
+        let path = tets.with_file_name(file);
+        let is_wanted = fields.values.is_some_and(|takes| takes(name));
+        let found = if is_wanted { open(&path)? } else { None };
+        let field = found.as_ref().and_then(|(rows, columns, kind, _)| {
+            let place = match counts.map(|n| n == *rows) {
+                [true, false] => FieldPlace::Vertices,
+                [false, true] => FieldPlace::Tets,
+                _ => return None,
+            };
+            mesh.field(name, place, field_number(kind)?, *columns as usize)
+        });
+        let (Some(field), Some((rows, columns, _, mut numbers))) = (field, found) else {
+            left_out.push(name);
+            continue;
+        };
+        let field = &mut mesh.fields[field];
+        for _ in 0..rows * columns {
+            field.words.push(numbers.word(field.number)?);
+        }
+        numbers.end()?;
+    }
+    mesh.leave_out(&left_out);
     Ok(())
 }
 
@@ -82,19 +135,31 @@ fn vertex(corners: &mut Numbers, n: u64) -> Result<u32> {
     })
 }
 
-/// The number of rows of an array of so many columns, and its numbers. Errors: another shape or type.
+/// The numbers of an array of so many columns, and of how many rows. Errors: another shape or type.
 fn array(path: &Path, columns: u64) -> Result<(u64, Numbers)> {
+    match open(path)? {
+        Some((rows, found, _, numbers)) if found == columns => Ok((rows, numbers)),
+        _ => {
+            let mut file = ArrayFile::open(path)?;
+            let (kind, _, shape) = file.head_words()?;
+            let expected = format!("rows of {columns} numbers in C order");
+            let found = format!("an array of shape {shape} and type {kind}");
+            Err(file.unexpected(Spot::Byte(8), &expected, found))
+        }
+    }
+}
+
+/// Rows, columns, type in VTK's words and numbers of an array; `None` for another shape or type.
+fn open(path: &Path) -> Result<Option<(u64, u64, &'static str, Numbers)>> {
     let mut file = ArrayFile::open(path)?;
     let (kind, is_by_rows, shape) = file.head_words()?;
-    let sides: Vec<u64> = sides_of(&shape).iter().filter_map(|side| side.parse().ok()).collect();
-    let rows = match sides[..] {
-        [n] if columns == 1 => n,
-        [n, k] if k == columns && (is_by_rows || columns == 1) => n,
-        _ => {
-            let expected = format!("rows of {columns} numbers in C order");
-            let found = format!("an array of shape {shape}");
-            return Err(file.unexpected(Spot::Byte(8), &expected, found));
-        }
+    let sides = sides_of(&shape);
+    let sides: Option<Vec<u64>> = sides.iter().map(|side| side.parse().ok()).collect();
+    let (rows, columns) = match sides.as_deref() {
+        Some(&[n]) => (n, 1),
+        Some(&[n, k]) if is_by_rows || k == 1 => (n, k),
+        Some(&[n, k, l]) if is_by_rows => (n, k.saturating_mul(l)),
+        _ => return Ok(None),
     };
     let word = match kind.trim_start_matches(['<', '>', '=', '|']) {
         "i1" => "Int8",
@@ -107,14 +172,14 @@ fn array(path: &Path, columns: u64) -> Result<(u64, Numbers)> {
         "u8" => "UInt64",
         "f4" => "Float32",
         "f8" => "Float64",
-        _ => return Err(file.unexpected(Spot::Byte(8), "an array of numbers", kind)),
+        _ => return Ok(None),
     };
     let is_big = kind.starts_with('>');
     let layout = Layout { is_big, header: 0, is_packed: false, block_max: 0 };
     let at = file.taken();
     let open = std::fs::File::open(path)
         .map_err(|e| FilePlace::new(path).refuse(ReadFault::Unreadable(e.to_string())))?;
-    let name = path.to_string_lossy();
-    let what = "the numbers of an array";
-    Ok((rows, Numbers::binary(&name, open, at, word, (Coding::Raw, layout), what)?))
+    let (name, what) = (path.to_string_lossy(), "the numbers of an array");
+    let numbers = Numbers::binary(&name, open, at, word, (Coding::Raw, layout), what)?;
+    Ok(Some((rows, columns, word, numbers)))
 }

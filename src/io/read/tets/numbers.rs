@@ -4,9 +4,12 @@ use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
+use super::hdf_rows::HdfRows;
 use super::{Feed, FilePlace, ReadFault, Result};
 use crate::read::error::Spot;
 use crate::read::xml::base64_word;
+use tetdb_schema::field::{FieldNumber, Scalar};
+use tetdb_schema::word::Word;
 
 /// Bytes read at once.
 const BUFFER_BYTES: usize = 1 << 16;
@@ -73,6 +76,17 @@ fn number_type(name: &str) -> Option<NumberType> {
     })
 }
 
+/// The type of a field that holds all numbers of a type of VTK.
+pub fn field_number(name: &str) -> Option<FieldNumber> {
+    Some(match name {
+        "Int8" | "UInt8" | "Int16" | "UInt16" | "Int32" => FieldNumber::I32,
+        "UInt32" | "Int64" | "UInt64" => FieldNumber::I64,
+        "Float32" => FieldNumber::F32,
+        "Float64" => FieldNumber::F64,
+        _ => return None,
+    })
+}
+
 /// The numbers of an array, front to back.
 pub struct Numbers {
     place: FilePlace,
@@ -81,6 +95,9 @@ pub struct Numbers {
 }
 
 enum From {
+    /// One number again and again.
+    Constant(i64),
+    Hdf(Box<HdfNumbers>),
     Text(Box<Feed<BufReader<ToTag>>>),
     Binary(Box<Binary>),
 }
@@ -100,6 +117,30 @@ impl Read for ToTag {
         let text = bytes[..n].iter().position(|&b| b == b'<');
         self.is_over = text.is_some();
         Ok(text.unwrap_or(n))
+    }
+}
+
+/// Numbers of an array in an HDF5 file.
+struct HdfNumbers {
+    rows: HdfRows,
+    kind: NumberType,
+    /// Bytes of a block, and how many are taken.
+    ready: Vec<u8>,
+    taken: usize,
+}
+
+impl HdfNumbers {
+    /// The bytes of the next number, the low one first.
+    #[inline]
+    fn next(&mut self) -> Option<[u8; 8]> {
+        if self.taken == self.ready.len() {
+            (self.ready, self.taken) = (self.rows.next_block()?, 0);
+        }
+        let n = self.kind.bytes;
+        let mut bytes = [0; 8];
+        bytes[..n].copy_from_slice(self.ready.get(self.taken..)?.get(..n)?);
+        self.taken += n;
+        Some(bytes)
     }
 }
 
@@ -172,6 +213,20 @@ impl Numbers {
         }
     }
 
+    /// Numbers of an array in an HDF5 file, whose type has this name in VTK.
+    pub fn hdf(place: FilePlace, rows: HdfRows, kind: &str, what: &'static str) -> Result<Self> {
+        let kind = number_type(kind).ok_or_else(|| {
+            place.refuse(ReadFault::Unsupported(format!("an array of the type {kind:?}")))
+        })?;
+        let numbers = HdfNumbers { rows, kind, ready: Vec::new(), taken: 0 };
+        Ok(Self { place, from: From::Hdf(Box::new(numbers)), what })
+    }
+
+    /// One number as often as it is asked for.
+    pub fn constant(place: FilePlace, number: i64) -> Self {
+        Self { place, from: From::Constant(number), what: "a number" }
+    }
+
     fn too_short(&self) -> super::ReadError {
         let (expected, found) = (self.what.to_owned(), "the end, or damaged data".to_owned());
         self.place.refuse(ReadFault::Truncated { expected, found })
@@ -189,6 +244,11 @@ impl Numbers {
                 Some(bytes) => Ok((binary.kind.value)(bytes)),
                 None => Err(self.too_short()),
             },
+            From::Hdf(hdf) => match hdf.next() {
+                Some(bytes) => Ok((hdf.kind.value)(bytes)),
+                None => Err(self.too_short()),
+            },
+            From::Constant(number) => Ok(*number as f64),
         }
     }
 
@@ -208,11 +268,46 @@ impl Numbers {
                 Some(bytes) => (binary.kind.whole)(bytes),
                 None => return Err(self.too_short()),
             },
+            From::Hdf(hdf) => match hdf.next() {
+                Some(bytes) => (hdf.kind.whole)(bytes),
+                None => return Err(self.too_short()),
+            },
+            From::Constant(number) => Some(*number),
         };
         found.ok_or_else(|| {
             let (expected, found) = (self.what.to_owned(), "a broken number".to_owned());
             self.place.refuse(ReadFault::Unexpected { expected, found })
         })
+    }
+
+    /// The word of the next number in a field of such numbers.
+    pub fn word(&mut self, number: FieldNumber) -> Result<u64> {
+        let scalar = match number.is_integer() {
+            true => Scalar::Int(self.integer()?),
+            false => Scalar::Float(self.real()?),
+        };
+        number.pack(scalar).ok_or_else(|| {
+            let (expected, found) = (format!("a number of {}", number.word()), "another");
+            self.place.refuse(ReadFault::Unexpected { expected, found: found.to_owned() })
+        })
+    }
+
+    /// Ends reading. Errors: there are more numbers.
+    pub fn end(mut self) -> Result<()> {
+        let is_over = match &mut self.from {
+            From::Text(feed) => feed.at_end()?,
+            From::Binary(binary) => binary.next().is_none(),
+            From::Hdf(hdf) => hdf.next().is_none(),
+            From::Constant(_) => true,
+        };
+        match is_over {
+            true => Ok(()),
+            false => {
+                let expected = format!("the end of the array of {}", self.what);
+                let found = "more numbers".to_owned();
+                Err(self.place.refuse(ReadFault::Unexpected { expected, found }))
+            }
+        }
     }
 
     pub fn place(&self) -> &FilePlace {

@@ -6,6 +6,7 @@ use std::io::BufRead;
 use super::{Feed, ReadFault, Result};
 use tetdb_base::geom::{Point, counted};
 use tetdb_base::storage::{ScratchSpace, SpillVec, SpillVecBuilder, check_cancelled};
+use tetdb_schema::field::{COMPONENTS, FieldNumber, FieldPlace};
 
 /// Most tetrahedra of a mesh: a sub-domain that has all of them cannot be sealed with more.
 const TETS_MAX: usize = 1 << 29;
@@ -38,6 +39,22 @@ pub struct RawMesh {
     /// Number of lines and points, and of tetrahedra and triangles with more nodes than corners.
     pub(super) n_thin: u64,
     pub(super) n_curved: u64,
+    /// Values at vertices and tetrahedra, as far as they are taken.
+    pub fields: Vec<RawField>,
+}
+
+/// Values of an array of the file.
+pub struct RawField {
+    /// Its name.
+    pub name: String,
+    /// Whether they belong to vertices or tetrahedra.
+    pub place: FieldPlace,
+    /// Type of the numbers.
+    pub number: FieldNumber,
+    /// Numbers of a value.
+    pub components: u32,
+    /// The words of all numbers, value by value, in the order of the vertices or tetrahedra of the file.
+    pub words: SpillVecBuilder<u64>,
 }
 
 /// How a mesh file is read.
@@ -47,6 +64,8 @@ pub struct MeshFields<'a> {
     pub part: Option<&'a str>,
     /// The array of cells that gives regions.
     pub region: Option<&'a str>,
+    /// Chooses the arrays of values that are taken, by name; `None` takes none.
+    pub values: Option<fn(&str) -> bool>,
 }
 
 /// Groups of elements by number, some with a name.
@@ -109,6 +128,7 @@ impl RawMesh {
             notes: Vec::new(),
             n_thin: 0,
             n_curved: 0,
+            fields: Vec::new(),
             space,
         }
     }
@@ -145,6 +165,30 @@ impl RawMesh {
     /// Adds a triangle.
     pub fn triangle(&mut self, [a, b, c]: [u32; 3], label: u32) {
         self.triangles.push([a, b, c, label]);
+    }
+
+    /// Begins values of so many numbers, unless no field has so many or one has the name; returns their position in `fields`.
+    pub(super) fn field(
+        &mut self,
+        name: &str,
+        place: FieldPlace,
+        number: FieldNumber,
+        components: usize,
+    ) -> Option<usize> {
+        let components = COMPONENTS.into_iter().find(|&n| n as usize == components)?;
+        if self.fields.iter().any(|field| field.name == name) {
+            return None;
+        }
+        let words = self.space.builder_within(self.space.available() / 32);
+        self.fields.push(RawField { name: name.to_owned(), place, number, components, words });
+        Some(self.fields.len() - 1)
+    }
+
+    /// Notes arrays of values that no field holds, or that are not taken.
+    pub(super) fn leave_out(&mut self, names: &[&str]) {
+        if !names.is_empty() {
+            self.notes.push(format!("arrays of values were left out: {}", names.join(", ")));
+        }
     }
 
     /// Ends reading: counts become notes.

@@ -83,9 +83,9 @@ fn one_mesh_is_the_same_in_every_format() {
         [("a.ele", ELE), ("a.node", NODE), ("a.face", FACE)].map(|(n, t)| (n, t.as_bytes()));
     check(read_with(&tetgen, MeshFields::default()), (9, ""), [0; 2]);
     check(read("a.vtu", VTU), (9, ""), [0; 2]);
-    let fields = MeshFields { part: Some("part"), region: Some("region") };
+    let fields = MeshFields { part: Some("part"), region: Some("region"), values: None };
     check(read_with(&[("a.vtu", VTU.as_bytes())], fields), (9, ""), [4, 3]);
-    let fields = MeshFields { part: Some("partition"), region: None };
+    let fields = MeshFields { part: Some("partition"), region: None, values: None };
     check(read_with(&[("a.msh", GMSH.as_bytes())], fields), (9, "wall"), [7, 7]);
     let twice = ABAQUS.replacen(
         "*ELSET",
@@ -101,7 +101,7 @@ fn one_mesh_is_the_same_in_every_format() {
 
 #[test]
 fn what_a_gmsh_file_has_too_much_or_too_little_of_is_told() {
-    let fields = MeshFields { part: Some("partition"), region: None };
+    let fields = MeshFields { part: Some("partition"), region: None, values: None };
     let mesh = read_with(&[("a.msh", GMSH4.as_bytes())], fields).expect("it can be read");
     assert!(mesh.parts.list.is_empty());
     assert_eq!(mesh.notes, ["the file has no partitions; planes divide the mesh"]);
@@ -194,7 +194,7 @@ fn broken_files_are_refused_with_their_places() {
         assert!(!error.help().is_empty());
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    let fields = MeshFields { part: Some("domain"), region: None };
+    let fields = MeshFields { part: Some("domain"), region: None, values: None };
     let missing = read_with(&[("a.vtu", VTU.as_bytes())], fields).err().expect("no such array");
     assert!(missing.to_string().contains("part"), "{missing}");
     assert!(read_with(&[("a.mesh", MEDIT.as_bytes())], fields).is_err());

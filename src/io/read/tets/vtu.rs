@@ -6,72 +6,145 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use super::numbers::{Coding, Layout, Numbers};
+use hdf5_reader::Hdf5File;
+
+use super::hdf_rows::HdfRows;
+use super::numbers::{Coding, Layout, Numbers, field_number};
 use super::{FilePlace, MeshFields, RawMesh, ReadError, ReadFault, Result};
 use crate::read::error::Spot;
 use crate::read::feed::{check_point, quote};
 use crate::read::open::{open_plain, unpacked_name};
 use crate::read::xml::Tag;
 use tetdb_base::geom::{Point, counted};
+use tetdb_schema::field::FieldPlace;
 
 /// Longest tag that is read.
 const TAG_MAX: u64 = 1 << 16;
 
 /// An array of a piece.
-struct ArrayAt {
-    section: String,
-    name: String,
-    kind: String,
-    n_components: usize,
-    format: String,
-    /// Byte behind its tag, or its place in the appended data.
-    at: u64,
+#[derive(Clone)]
+pub struct ArrayAt {
+    pub section: String,
+    pub name: String,
+    pub kind: String,
+    pub n_components: usize,
+    /// How its numbers are written; in an HDF5 file its path.
+    pub format: String,
+    /// Byte behind its tag, its place in the appended data, or its first row in an HDF5 file.
+    pub at: u64,
+    /// Number of rows, where the file says it.
+    pub rows: u64,
 }
 
-#[derive(Default)]
-struct Piece {
-    n_points: u64,
-    n_cells: u64,
-    arrays: Vec<ArrayAt>,
+pub struct Piece {
+    pub n_points: u64,
+    pub n_cells: u64,
+    /// Number of the partition of a VTKHDF file.
+    pub partition: Option<i64>,
+    pub arrays: Vec<ArrayAt>,
 }
 
-struct Grid {
+/// Name of the array that stands for the partitions of a VTKHDF file.
+const PARTITION: &str = "partition";
+
+/// The arrays of the cells of a piece.
+struct CellArrays {
+    types: Numbers,
+    ends: Numbers,
+    vertices: Numbers,
+    /// Regions, parts, labels and kinds of copies, where there are any.
+    lists: [Option<Numbers>; 4],
+    /// Values, and their fields.
+    values: Vec<(usize, Numbers)>,
+}
+
+/// An array of values that is taken: its name, its section, and its field.
+type TakenArray = (String, String, usize);
+
+pub struct Grid {
     name: String,
     path: std::path::PathBuf,
     layout: Layout,
     appended: Option<(u64, Coding)>,
     pieces: Vec<Piece>,
+    hdf: Option<Hdf5File>,
 }
 
 pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
     let grid = Grid::open(path, mesh.space.cap() / 16)?;
-    let (mut first, mut n_ghosts) = (0, 0);
-    for piece in &grid.pieces {
-        grid.points(piece, mesh)?;
-        n_ghosts += grid.cells(piece, first, fields, mesh)?;
-        first += piece.n_points;
-    }
-    let mut left_out: Vec<&str> = Vec::new();
-    for array in grid.pieces.iter().flat_map(|piece| &piece.arrays) {
-        let name = array.name.as_str();
-        let is_taken =
-            [fields.region, fields.part, Some("region"), Some("label")].contains(&Some(name));
-        let is_values = ["PointData", "CellData"].contains(&array.section.as_str());
-        if is_values && !is_taken && name != "vtkGhostType" && !left_out.contains(&name) {
-            left_out.push(name);
-        }
-    }
-    if !left_out.is_empty() {
-        mesh.notes.push(format!("arrays of values were left out: {}", left_out.join(", ")));
-    }
-    if n_ghosts > 0 {
-        let text = "[cell is a copy of one in another piece and was|cells are copies of those in other pieces and were] left out";
-        mesh.notes.push(counted(n_ghosts, text));
-    }
-    Ok(())
+    grid.read(fields, mesh)
 }
 
 impl Grid {
+    /// Reads the pieces into a mesh.
+    pub(super) fn read(&self, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
+        let taken = self.values(fields, mesh);
+        let (mut first, mut n_ghosts) = (0, 0);
+        for piece in &self.pieces {
+            self.points(piece, &taken, mesh)?;
+            n_ghosts += self.cells(piece, first, fields, &taken, mesh)?;
+            first += piece.n_points;
+        }
+        if n_ghosts > 0 {
+            let text = "[cell is a copy of one in another piece and was|cells are copies of those in other pieces and were] left out";
+            mesh.notes.push(counted(n_ghosts, text));
+        }
+        Ok(())
+    }
+
+    /// Begins a field for each array of values that all pieces have alike; notes the others.
+    fn values(&self, fields: MeshFields, mesh: &mut RawMesh) -> Vec<TakenArray> {
+        let (mut taken, mut left_out): (Vec<TakenArray>, Vec<&str>) = (Vec::new(), Vec::new());
+        let pieces = || self.pieces.iter().filter(|piece| piece.n_points > 0);
+        let known =
+            [fields.region, fields.part, Some("region"), Some("label"), Some("vtkGhostType")];
+        for array in pieces().flat_map(|piece| &piece.arrays) {
+            let name = array.name.as_str();
+            let place = match array.section.as_str() {
+                "PointData" => FieldPlace::Vertices,
+                "CellData" => FieldPlace::Tets,
+                _ => continue,
+            };
+            let is_new = !taken.iter().any(|(known, section, _)| {
+                (known.as_str(), section.as_str()) == (name, array.section.as_str())
+            });
+            if known.contains(&Some(name)) || !is_new || left_out.contains(&name) {
+                continue;
+            }
+            let is_alike = |other: &&ArrayAt| {
+                (&other.section, &other.name, &other.kind, other.n_components)
+                    == (&array.section, &array.name, &array.kind, array.n_components)
+            };
+            let is_everywhere = pieces().all(|piece| piece.arrays.iter().any(|a| is_alike(&a)));
+            let is_wanted = fields.values.is_some_and(|takes| takes(name)) && is_everywhere;
+            let number = field_number(&array.kind).filter(|_| is_wanted);
+            let n = array.n_components.max(1);
+            match number.and_then(|number| mesh.field(name, place, number, n)) {
+                Some(field) => taken.push((name.to_owned(), array.section.clone(), field)),
+                None => left_out.push(name),
+            }
+        }
+        mesh.leave_out(&left_out);
+        taken
+    }
+
+    /// The numbers of taken arrays of one section of a piece, and their fields.
+    fn taken_numbers(
+        &self,
+        piece: &Piece,
+        taken: &[TakenArray],
+        section: &str,
+    ) -> Result<Vec<(usize, Numbers)>> {
+        let own = taken.iter().filter(|(_, own, _)| own == section);
+        own.map(|(name, _, field)| {
+            let mut arrays = piece.arrays.iter();
+            let array = arrays.find(|a| a.section == section && a.name == *name);
+            let array = array.ok_or_else(|| self.expected(0, "an array of values"))?;
+            Ok((*field, self.numbers(array, "a value of an array")?))
+        })
+        .collect()
+    }
+
     fn refuse(&self, at: u64, fault: ReadFault) -> ReadError {
         FilePlace { file: self.name.clone(), spot: Spot::Byte(at) }.refuse(fault)
     }
@@ -88,6 +161,7 @@ impl Grid {
             layout: Layout { is_big: false, header: 4, is_packed: false, block_max },
             appended: None,
             pieces: Vec::new(),
+            hdf: None,
         };
         let (mut at, mut sections, mut is_vtk) = (0, Vec::<String>::new(), false);
         while let Some(text) = next_tag(&mut file, &mut at) {
@@ -103,7 +177,8 @@ impl Grid {
                     let (Some(n_points), Some(n_cells)) = (n_points, n_cells) else {
                         return Err(grid.expected(at, "NumberOfPoints and NumberOfCells"));
                     };
-                    grid.pieces.push(Piece { n_points, n_cells, arrays: Vec::new() });
+                    let (partition, arrays) = (None, Vec::new());
+                    grid.pieces.push(Piece { n_points, n_cells, partition, arrays });
                 }
                 ("AppendedData", false) => {
                     let mut skipped = Vec::new();
@@ -130,6 +205,7 @@ impl Grid {
                             n_components: text("NumberOfComponents").parse().unwrap_or(1),
                             format: text("format"),
                             at: offset.unwrap_or(at),
+                            rows: 0,
                         };
                         piece.arrays.push(array);
                     }
@@ -166,7 +242,26 @@ impl Grid {
         }
     }
 
+    /// The pieces of an HDF5 file.
+    pub fn of_hdf(path: &Path, file: Hdf5File, pieces: Vec<Piece>) -> Self {
+        Self {
+            name: path.to_string_lossy().into_owned(),
+            path: path.to_owned(),
+            layout: Layout { is_big: false, header: 0, is_packed: false, block_max: 0 },
+            appended: None,
+            pieces,
+            hdf: Some(file),
+        }
+    }
+
     fn numbers(&self, array: &ArrayAt, what: &'static str) -> Result<Numbers> {
+        if let Some(file) = &self.hdf {
+            let place = FilePlace::new(&self.path);
+            let rows = file.dataset(&array.format);
+            let rows = rows.map_err(|e| place.refuse(ReadFault::Unreadable(e.to_string())))?;
+            let rows = HdfRows::new(rows, array.at, array.rows);
+            return Numbers::hdf(place, rows, &array.kind, what);
+        }
         let file = File::open(&self.path)
             .map_err(|e| self.refuse(0, ReadFault::Unreadable(e.to_string())))?;
         let (at, coding) = match (array.format.as_str(), self.appended) {
@@ -178,7 +273,7 @@ impl Grid {
         Numbers::binary(&self.name, file, at, &array.kind, (coding, self.layout), what)
     }
 
-    fn points(&self, piece: &Piece, mesh: &mut RawMesh) -> Result<()> {
+    fn points(&self, piece: &Piece, taken: &[TakenArray], mesh: &mut RawMesh) -> Result<()> {
         if piece.n_points == 0 {
             return Ok(());
         }
@@ -193,6 +288,14 @@ impl Grid {
             check_point(p, numbers.place())?;
             mesh.point(p);
         }
+        numbers.end()?;
+        for (field, mut numbers) in self.taken_numbers(piece, taken, "PointData")? {
+            let field = &mut mesh.fields[field];
+            for _ in 0..piece.n_points * u64::from(field.components) {
+                field.words.push(numbers.word(field.number)?);
+            }
+            numbers.end()?;
+        }
         Ok(())
     }
 
@@ -205,6 +308,9 @@ impl Grid {
         let Some(name) = name else { return Ok(None) };
         let cells = || piece.arrays.iter().filter(|a| a.section == "CellData");
         match cells().find(|a| a.name == name) {
+            None if name == PARTITION && piece.partition.is_some() => {
+                Ok(piece.partition.map(|n| Numbers::constant(FilePlace::new(&self.path), n)))
+            }
             Some(array) if array.n_components <= 1 => self.numbers(array, what).map(Some),
             Some(array) => Err(self.expected(array.at, "one number for each cell")),
             None => {
@@ -216,33 +322,51 @@ impl Grid {
         }
     }
 
+    /// Opens the arrays of the cells of a piece. Errors: one is missing.
+    fn cell_arrays(
+        &self,
+        piece: &Piece,
+        fields: MeshFields,
+        taken: &[TakenArray],
+    ) -> Result<CellArrays> {
+        let array = |name: &str, what| {
+            let array = piece.arrays.iter().find(|a| a.section == "Cells" && a.name == name);
+            self.numbers(array.ok_or_else(|| self.expected(0, what))?, what)
+        };
+        let has =
+            |name: &&str| piece.arrays.iter().any(|a| a.section == "CellData" && a.name == *name);
+        let region = fields.region.or(Some("region").filter(has));
+        let (label, ghost) = (Some("label").filter(has), Some("vtkGhostType").filter(has));
+        Ok(CellArrays {
+            types: array("types", "the types of cells")?,
+            ends: array("offsets", "the offsets of cells")?,
+            vertices: array("connectivity", "the vertices of cells")?,
+            lists: [
+                self.cell_array(piece, region, "the region of a cell")?,
+                self.cell_array(piece, fields.part, "the part of a cell")?,
+                self.cell_array(piece, label, "the label of a cell")?,
+                self.cell_array(piece, ghost, "the kind of a copied cell")?,
+            ],
+            values: self.taken_numbers(piece, taken, "CellData")?,
+        })
+    }
+
     /// Reads the cells of a piece; returns how many are copies.
     fn cells(
         &self,
         piece: &Piece,
         first: u64,
         fields: MeshFields,
+        taken: &[TakenArray],
         mesh: &mut RawMesh,
     ) -> Result<u64> {
         if piece.n_cells == 0 {
             return Ok(0);
         }
-        let array = |name: &str, what| {
-            let array = piece.arrays.iter().find(|a| a.section == "Cells" && a.name == name);
-            self.numbers(array.ok_or_else(|| self.expected(0, what))?, what)
-        };
-        let mut types = array("types", "the types of cells")?;
-        let mut ends = array("offsets", "the offsets of cells")?;
-        let mut vertices = array("connectivity", "the vertices of cells")?;
-        let has =
-            |name: &&str| piece.arrays.iter().any(|a| a.section == "CellData" && a.name == *name);
-        let region = fields.region.or(Some("region").filter(has));
-        let mut regions = self.cell_array(piece, region, "the region of a cell")?;
-        let mut parts = self.cell_array(piece, fields.part, "the part of a cell")?;
-        let mut labels =
-            self.cell_array(piece, Some("label").filter(has), "the label of a cell")?;
-        let ghost = Some("vtkGhostType").filter(has);
-        let mut ghosts = self.cell_array(piece, ghost, "the kind of a copied cell")?;
+        let CellArrays { mut types, mut ends, mut vertices, lists, mut values } =
+            self.cell_arrays(piece, fields, taken)?;
+        let [mut regions, mut parts, mut labels, mut ghosts] = lists;
+        let mut row = Vec::new();
         let (mut from, mut n_ghosts) = (0, 0);
         let next = |list: &mut Option<Numbers>| list.as_mut().map_or(Ok(0), Numbers::integer);
         for cell in 0..piece.n_cells {
@@ -252,19 +376,14 @@ impl Grid {
             let n = n.ok_or_else(|| self.expected(0, "offsets of cells that rise"))?;
             from = end;
             for k in 0..n as usize {
-                let v = vertices.integer()?;
-                let known = u64::try_from(v).ok().filter(|&v| v < piece.n_points);
-                let Some(v) = known else {
-                    let (low, high) = (0, piece.n_points as i64 - 1);
-                    let fault = ReadFault::IndexOutOfRange { index: v, low, high };
-                    return Err(vertices.place().refuse(fault));
-                };
+                let v = vertex(&mut vertices, piece.n_points)?;
                 if let Some(corner) = corners.get_mut(k) {
                     *corner = (v + first) as u32;
                 }
             }
             let (region, part) = (next(&mut regions)?, next(&mut parts)?);
             let (label, ghost) = (next(&mut labels)?, next(&mut ghosts)?);
+            read_row(&mut values, mesh, &mut row)?;
             if ghost & 1 != 0 {
                 n_ghosts += 1;
                 continue;
@@ -276,6 +395,7 @@ impl Grid {
                     let region = mesh.regions.number(region);
                     let part = if parts.is_some() { mesh.parts.number(part) } else { 0 };
                     mesh.tet(corners, region, part).map_err(|fault| types.place().refuse(fault))?;
+                    push_row(&values, mesh, &row);
                 }
                 (5, 3) | (22, 6) | (69, 3..) => {
                     mesh.n_curved += u64::from(n > 3);
@@ -290,7 +410,42 @@ impl Grid {
                 }
             }
         }
+        [types, ends, vertices].into_iter().try_for_each(Numbers::end)?;
+        let lists = [regions, parts, labels, ghosts];
+        let lists = lists.into_iter().flatten();
+        lists.chain(values.into_iter().map(|(_, numbers)| numbers)).try_for_each(Numbers::end)?;
         Ok(n_ghosts)
+    }
+}
+
+/// The next vertex of a cell. Errors: the piece has no such vertex.
+fn vertex(vertices: &mut Numbers, n_points: u64) -> Result<u64> {
+    let index = vertices.integer()?;
+    let known = u64::try_from(index).ok().filter(|&v| v < n_points);
+    known.ok_or_else(|| {
+        let (low, high) = (0, n_points as i64 - 1);
+        vertices.place().refuse(ReadFault::IndexOutOfRange { index, low, high })
+    })
+}
+
+/// Reads the words of all fields of a cell.
+fn read_row(values: &mut [(usize, Numbers)], mesh: &RawMesh, row: &mut Vec<u64>) -> Result<()> {
+    row.clear();
+    for (field, numbers) in values {
+        let field = &mesh.fields[*field];
+        for _ in 0..field.components {
+            row.push(numbers.word(field.number)?);
+        }
+    }
+    Ok(())
+}
+
+/// Adds the words of a cell to their fields.
+fn push_row(values: &[(usize, Numbers)], mesh: &mut RawMesh, row: &[u64]) {
+    let mut words = row.iter();
+    for (field, _) in values {
+        let field = &mut mesh.fields[*field];
+        words.by_ref().take(field.components as usize).for_each(|&word| field.words.push(word));
     }
 }
 

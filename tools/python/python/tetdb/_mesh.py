@@ -179,6 +179,7 @@ def import_mesh(
     subdomains: int | None = None,
     part_field: str | None = None,
     region_field: str | None = None,
+    fields: bool = True,
     memory: int | str | None = None,
     threads: int | None = None,
     progress: bool | Progress | None = None,
@@ -199,6 +200,8 @@ def import_mesh(
         Number of sub-domains. Default: one for every ten million tetrahedra.
     part_field, region_field : str, optional
         Arrays of the file's cells that give sub-domains and regions.
+    fields : bool
+        Whether arrays of values become fields of the store.
     memory, threads, progress, existing, verify
         As for :func:`mesh`; a store that is there is replaced or refused.
 
@@ -218,7 +221,7 @@ def import_mesh(
     """
     where, settings = _path(path), _options.settings(memory, threads)
     replace = _options.one_of(existing, ("keep", "replace"), "existing") == "replace"
-    how = (subdomains, part_field, region_field)
+    how = (subdomains, part_field, region_field, bool(fields))
     listener = _options.listener(progress)
     if isinstance(mesh, (str, os.PathLike)):
         _native.import_mesh(_path(mesh), where, how, settings, replace, bool(verify), listener)

@@ -88,7 +88,7 @@ def mesh(
 def import_mesh(
     file: str,
     path: str,
-    how: tuple[int | None, str | None, str | None],
+    how: tuple[int | None, str | None, str | None, bool],
     settings: dict[str, Any],
     replace: bool,
     verify: bool,
