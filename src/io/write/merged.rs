@@ -165,6 +165,11 @@ impl<'a> Merged<'a> {
         Ok(self.fields.clone())
     }
 
+    /// The catalog that is read.
+    pub fn catalog(&mut self) -> &mut Catalog {
+        self.store
+    }
+
     /// The written embedded edges and points.
     pub fn embedded(&self) -> &WrittenEmbedded {
         &self.embedded
@@ -311,6 +316,11 @@ impl<'a> Merged<'a> {
     /// The folder for scratch.
     pub fn dir(&self) -> &Path {
         &self.dir
+    }
+
+    /// Bytes that may be held.
+    pub fn memory_bytes(&self) -> u64 {
+        self.memory as u64
     }
 
     /// Bytes for a sorter beside a pass.
