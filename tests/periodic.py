@@ -5,7 +5,7 @@
 
 Meshes a box that is periodic in three directions and a sector of a cylinder. Pairs in .msh, of first and second order, are compared with
 pairs found here by comparing all vertices. Poisson's equation with a periodic solution is solved with linear elements on two meshes; the
-error must fall as h². MFEM joins the vertices of NAME_periodic.csv; no face may be left on the boundary. What is not installed is skipped.
+error must fall as h². MFEM joins the vertices of NAME_periodic.csv; every face must then be of two tetrahedra. What is not installed is skipped.
 Exit code 0 when all agree, else 1.
 """
 import csv
@@ -136,9 +136,10 @@ def check_mfem(name):
     with open(FOLDER / f"{name}_periodic.csv") as lines:
         for row in csv.DictReader(lines):
             joined[int(row["vertex"])] = joined[int(row["partner"])] = int(row["least"])
-    periodic = mfem.Mesh.MakePeriodic(mesh, mfem.intArray(joined))
+    periodic = mfem.Mesh.MakePeriodic(mesh, joined)
     assert periodic.GetNE() == mesh.GetNE()
-    assert periodic.GetNBE() == 0, f"{periodic.GetNBE()} faces on the boundary of a periodic box"
+    # Without a boundary, each of the four faces of a tetrahedron belongs to two.
+    assert periodic.GetNFaces() == 2 * periodic.GetNE() < mesh.GetNFaces()
     print(f"{name}.mfem: MFEM joins the pairs")
 
 
@@ -153,7 +154,7 @@ def main():
     turn = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
     ends = [("end", "start", lambda p: abs(p[1]) < 1e-12, lambda p: turn @ p)]
     try:
-        for words in ([], ["--order", 2], ["--ascii"], ["--format", "msh22"]):
+        for words in ([], ["--order", 2], ["--ascii"]):
             for name, faces in (("coarse", boxes), ("fine", boxes), ("sector", ends)):
                 file = f"{name}{''.join(map(str, words))}.msh"
                 tetdb("export", f"{name}.tetdb", file, *words)

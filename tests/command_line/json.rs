@@ -92,6 +92,7 @@ const RUNS: [(&str, &[&str]); 22] = [
             "resaturate a.tetdb --forget",
         ],
     ),
+    ("periodic", &["periodic a.tetdb x-low=x-high", "periodic a.tetdb"]),
     (
         "version",
         &[

@@ -58,7 +58,7 @@ pub(super) fn write(
         MeshFormat::Gmsh => {
             counts = gmsh::write(mesh, outputs, out, (selection, midpoints, &periodic))?
         }
-        MeshFormat::Gmsh22 => gmsh22::write(mesh, outputs, out, &periodic)?,
+        MeshFormat::Gmsh22 => gmsh22::write(mesh, outputs, out)?,
         MeshFormat::Abaqus => abaqus::write(mesh, outputs, out, midpoints)?,
         MeshFormat::Su2 => counts.triangles = su2::write(mesh, outputs, out)?,
         MeshFormat::Numpy => npy_columns::write(mesh, outputs, out, &periodic)?,
@@ -83,7 +83,7 @@ pub(super) fn write(
     if (!has_lines || lacks_points) && selection.content == Content::Mesh {
         write_list(mesh, outputs, out)?;
     }
-    if !matches!(format, MeshFormat::Gmsh | MeshFormat::Gmsh22 | MeshFormat::Numpy) {
+    if !matches!(format, MeshFormat::Gmsh | MeshFormat::Numpy) {
         periodic.write_list(mesh, outputs, out)?;
     }
     mesh.report_end();

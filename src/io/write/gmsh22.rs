@@ -10,7 +10,6 @@ use super::error::Result;
 use super::gmsh;
 use super::merged::Merged;
 use super::output_files::OutputFiles;
-use super::periodic::WrittenPeriodic;
 use super::stream::Stream;
 
 /// Gmsh's numbers of the types of elements.
@@ -22,12 +21,7 @@ const TETRAHEDRON: u32 = 4;
 const N_TAGS: u32 = 2;
 const N_TAGS_PARTITIONED: u32 = 4;
 
-pub(super) fn write(
-    mesh: &mut Merged,
-    outputs: &mut OutputFiles,
-    out: &Path,
-    periodic: &WrittenPeriodic,
-) -> Result<()> {
+pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
     mesh.check_limits(out, i32::MAX as u64)?;
     mesh.expect_passes(1, 1);
     let elements_bytes = 24 * mesh.n_faces() + 28 * mesh.n_tets();
@@ -56,21 +50,6 @@ pub(super) fn write(
     stream.text(&format!("\n$EndNodes\n$Elements\n{n}\n"));
     elements(mesh, &mut stream)?;
     stream.text("\n$EndElements\n");
-    if !periodic.0.is_empty() {
-        // Always text: the moved surface and its master, the motion, the nodes.
-        stream.text(&format!("$Periodic\n{}\n", periodic.0.len()));
-        for link in &periodic.0 {
-            let [first, second] = link.row.labels.map(|label| label + 1);
-            stream.text(&format!("2 {second} {first}\nAffine "));
-            stream.doubles(link.matrix(), b' ', b'\n');
-            stream.integer(link.nodes.len() as u64, b'\n');
-            for [a, b] in &link.nodes {
-                stream.integers([b + 1, a + 1], b' ', b'\n');
-                stream.end()?;
-            }
-        }
-        stream.text("$EndPeriodic\n");
-    }
     stream.finish()
 }
 

@@ -1,4 +1,5 @@
-//! Periodic pairs of labels in a written mesh: a section in Gmsh's formats, arrays for NumPy, a table beside all others.
+//! Periodic pairs of labels in a written mesh: a section of Gmsh 4.1, arrays for NumPy, a table beside all others (Gmsh does not take the
+//! section from binary files of version 2.2).
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
