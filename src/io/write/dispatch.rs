@@ -29,7 +29,7 @@ pub(super) fn write(
     };
     let midpoints = midpoints.as_ref();
     let periodic = match selection.has_periodic(format) {
-        true => WrittenPeriodic::gather(mesh, midpoints, mesh.memory_bytes() / 4)?,
+        true => WrittenPeriodic::gather(mesh, midpoints, mesh.memory as u64 / 4)?,
         false => WrittenPeriodic::default(),
     };
     let mut counts = FileCounts {

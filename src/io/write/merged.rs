@@ -71,7 +71,7 @@ pub(super) struct OpenedPart {
 ///
 /// Shape: `parts` by rank. Each pass reads every chunk once and holds a quarter of the memory.
 pub(super) struct Merged<'a> {
-    store: &'a mut Catalog,
+    pub(super) store: &'a mut Catalog,
     parts: Vec<Source>,
     regions: BTreeSet<u32>,
     numbering: Numbering,
@@ -87,7 +87,7 @@ pub(super) struct Merged<'a> {
     /// Fields at vertices and at tetrahedra that are read with them.
     fields: [Vec<FieldRow>; 2],
     dir: PathBuf,
-    memory: usize,
+    pub(super) memory: usize,
     progress: ReadProgress<'a>,
     /// Sub-domains whose vertices and tetrahedra are read, by place.
     window: Range<usize>,
@@ -163,11 +163,6 @@ impl<'a> Merged<'a> {
             false => [vertices, tets],
         };
         Ok(self.fields.clone())
-    }
-
-    /// The catalog that is read.
-    pub fn catalog(&mut self) -> &mut Catalog {
-        self.store
     }
 
     /// The written embedded edges and points.
@@ -316,11 +311,6 @@ impl<'a> Merged<'a> {
     /// The folder for scratch.
     pub fn dir(&self) -> &Path {
         &self.dir
-    }
-
-    /// Bytes that may be held.
-    pub fn memory_bytes(&self) -> u64 {
-        self.memory as u64
     }
 
     /// Bytes for a sorter beside a pass.

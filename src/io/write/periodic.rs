@@ -30,7 +30,7 @@ pub(super) struct WrittenPeriodic(pub Vec<PeriodicLink>);
 impl WrittenPeriodic {
     /// Gathers the pairs of nodes of which both are written, within `memory` bytes. Errors: more is needed; damage, the disk.
     pub fn gather(mesh: &mut Merged, midpoints: Option<&Midpoints>, memory: u64) -> Result<Self> {
-        let rows = mesh.catalog().periodic()?;
+        let rows = mesh.store.periodic()?;
         let needed = BYTES_EACH * rows.iter().map(|row| row.vertices).sum::<u64>();
         if needed > memory {
             let what = "periodic pairs of vertices";
@@ -38,7 +38,7 @@ impl WrittenPeriodic {
         }
         let mut lists = Vec::new();
         for row in &rows {
-            lists.push(mesh.catalog().periodic_vertices(row)?);
+            lists.push(mesh.store.periodic_vertices(row)?);
         }
         let all = lists.iter().flatten().flatten();
         let mut numbers: HashMap<u32, Option<u64>> = all.map(|&index| (index, None)).collect();
