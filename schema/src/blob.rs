@@ -41,6 +41,10 @@ pub enum Blob {
     PreviousRequest(u32),
     /// [`StageFaces`](crate::topology::StageFaces), by cut; only where stages are kept.
     StageFaces(u32),
+    /// Two u32 for each pair of vertices, by pair of labels.
+    PeriodicVertices(u32),
+    /// Two u64 for each pair of triangles, by pair of labels.
+    PeriodicTriangles(u32),
 }
 
 impl Blob {
@@ -61,6 +65,8 @@ impl Blob {
             Self::PreviousField(rank) => (8, rank),
             Self::PreviousRequest(rank) => (9, rank),
             Self::StageFaces(cut) => (10, cut),
+            Self::PeriodicVertices(id) => (11, id),
+            Self::PeriodicTriangles(id) => (12, id),
         };
         (base << INDEX_BITS) + index
     }
@@ -83,6 +89,8 @@ impl Blob {
             (8, rank) => Self::PreviousField(rank),
             (9, rank) => Self::PreviousRequest(rank),
             (10, cut) => Self::StageFaces(cut),
+            (11, id) => Self::PeriodicVertices(id),
+            (12, id) => Self::PeriodicTriangles(id),
             _ => return None,
         })
     }
@@ -125,6 +133,8 @@ impl fmt::Display for Blob {
                 write!(f, "previous requested sizes of sub-domain {rank}")
             }
             Self::StageFaces(cut) => write!(f, "faces kept of cut {cut}"),
+            Self::PeriodicVertices(id) => write!(f, "vertices of periodic pair {id}"),
+            Self::PeriodicTriangles(id) => write!(f, "triangles of periodic pair {id}"),
         }
     }
 }
@@ -207,6 +217,6 @@ mod tests {
                 n_blobs += 1;
             }
         }
-        assert_eq!(n_blobs, 4 + 10 * 6);
+        assert_eq!(n_blobs, 4 + 12 * 6);
     }
 }

@@ -77,6 +77,7 @@ codes! {
     WireContact "wire-contact" 3 "an embedded edge or point meets a triangle or an edge elsewhere than in common vertices";
     WireTooNear "wire-too-near" 3 "an embedded edge or point is nearer to something else than can be meshed";
     BadField "bad-field" 3 "the name, type or values of a field do not fit the store";
+    NotPeriodic "not-periodic" 3 "two labels of a periodic pair have not the same triangles, or cannot be a pair";
     BadVersion "bad-version" 3 "the name of a version is no name or is taken, or a version would be changed";
     BadMesh "bad-mesh" 3 "a mesh to import is not one of positive tetrahedra that share whole faces";
     NoSuchStore "no-such-store" 3 "there is no store at this path";

@@ -12,6 +12,7 @@ pub mod field;
 pub mod ids;
 pub mod labels;
 pub mod page;
+pub mod periodic;
 pub mod record;
 pub mod row;
 pub mod source;

@@ -64,11 +64,13 @@ pub enum RowKind {
     Version = 84,
     /// The content of a row of a version; the rest of the key is a number drawn from the content.
     Copy = 85,
+    /// [`PeriodicRow`](crate::periodic::PeriodicRow) (0, number of the pair).
+    Periodic = 86,
 }
 
 impl RowKind {
     /// All kinds, by number.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Format,
         Self::State,
         Self::Job,
@@ -91,6 +93,7 @@ impl RowKind {
         Self::PreviousFieldPart,
         Self::Version,
         Self::Copy,
+        Self::Periodic,
     ];
 
     /// The kind of a key; `None` for a key of no row.

@@ -130,6 +130,9 @@ fn print_at(path: &Path, settings: &Settings, console: &Console) -> Result<(), F
     print_bytes(&info, console);
     print_subdomains(&info, console);
     print_regions(&info.regions, &info.labels, console);
+    for pair in &info.periodic {
+        console.line(&format!("periodic {pair}"));
+    }
     for field in &info.fields {
         console.line(&format!("field {}", super::field::line(field)));
     }

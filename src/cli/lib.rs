@@ -21,6 +21,7 @@ mod input;
 mod memory;
 mod mesh;
 mod names;
+mod periodic;
 mod query;
 mod query_ask;
 mod query_rows;
@@ -212,6 +213,7 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Query(args) => query::run(args, console),
         Command::Field(args) => field::run(args, console),
         Command::Transfer(args) => transfer::run(args, console),
+        Command::Periodic(args) => periodic::run(args, console),
         Command::Version(args) => version::run(args, console),
         Command::Verify(args) => verify::run(args, console),
         Command::Compare(args) => compare::run(args, console),
@@ -241,6 +243,7 @@ fn writes_files(command: &Command) -> bool {
             | Command::Query(_)
             | Command::Field(_)
             | Command::Transfer(_)
+            | Command::Periodic(_)
             | Command::Version(_)
     )
 }

@@ -44,7 +44,8 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         &beside,
         console,
     )?;
-    let created = Mesher::with_options(surface, options)
+    let mesher = Mesher::with_options(surface, options);
+    let created = (args.periodic.pairs().fold(mesher, Mesher::periodic))
         .settings(settings.clone())
         .existing(existing)
         .preflight(!args.no_preflight)

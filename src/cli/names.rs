@@ -29,6 +29,7 @@ pub fn names(command: &Command) -> Vec<(&'static str, String)> {
         Command::Query(a) => (Some(a.store.clone()), None),
         Command::Field(a) => (Some(a.store.clone()), None),
         Command::Transfer(a) => (Some(a.to.clone()), None),
+        Command::Periodic(a) => (Some(a.store.clone()), None),
         Command::Version(a) => (Some(a.store.clone()), None),
         Command::Verify(a) => (Some(a.store.clone()), None),
         Command::Export(a) => (Some(a.store.clone()), None),

@@ -29,6 +29,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("contradicting-orientation", "walls.rs"),
     ("bad-field", "fields.rs"),
     ("bad-version", "versions.rs"),
+    ("not-periodic", "periodic.rs"),
     ("bad-mesh", "import.rs"),
     ("bad-seed", "seeds.rs"),
     ("sheet-outside", "sheets.rs"),

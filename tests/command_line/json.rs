@@ -15,7 +15,7 @@ const FREE: [&str; 5] =
     ["options", "subdomains[].sizes.options", "findings", "measures.chunks", "qualities"];
 
 /// The commands of each section, in order. The surfaces are written first.
-const RUNS: [(&str, &[&str]); 22] = [
+const RUNS: [(&str, &[&str]); 23] = [
     ("sample", &["sample box,h=0.045 -o box.stl", "sample sphere,h=0.2 -o sphere.stl"]),
     (
         "check",
@@ -92,6 +92,7 @@ const RUNS: [(&str, &[&str]); 22] = [
             "resaturate a.tetdb --forget",
         ],
     ),
+    ("periodic", &["periodic a.tetdb x-low=x-high", "periodic a.tetdb"]),
     (
         "version",
         &[

@@ -18,6 +18,7 @@ mod json;
 mod limits;
 mod odd_inputs;
 mod people;
+mod periodic;
 mod pieces;
 mod place;
 mod point_files;

@@ -8,7 +8,7 @@
 //! triangles), `seeker` (distances, triangles above a point), `volumes` (enclosed volumes), `seeds` (points that name
 //! volumes), `sheets` (embedded triangles), `embedded_set` and `embedded` (embedded edges and points),
 //! `embedded_contact` (their contacts), `divide` (triangles divided at embedded vertices), `support_triangles` (which
-//! keep embedded edges), `point_sizes`.
+//! keep embedded edges), `point_sizes`, `periodic` (labels that are the same at two places).
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
@@ -26,6 +26,7 @@ mod embedded_set;
 mod fitness;
 mod label_sets;
 mod orientation;
+mod periodic;
 mod point_sizes;
 mod point_tree;
 mod polygon;
@@ -57,6 +58,9 @@ pub use edges::{Closedness, closedness};
 pub use embedded_set::{EmbedError, Embedded, EmbeddedSet};
 pub use fitness::{Fitness, fitness};
 pub use orientation::{Orientation, orient_alike, orient_alike_with};
+pub use periodic::{
+    MotionKind, Patch, PatchTriangle, PeriodicMatch, Unpaired, UnpairedPart, match_patches,
+};
 pub use repair::{
     Closing, Merged, Repair, closing, drop_folds, merge_repeated, repair, repair_bytes,
     replace_triangles,

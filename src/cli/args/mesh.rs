@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::run::RunArgs;
-use super::{RemeshArgs, RepairArgs, ShapeArgs, SheetArgs};
+use super::{PeriodicPairArgs, RemeshArgs, RepairArgs, ShapeArgs, SheetArgs};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -26,6 +26,8 @@ pub struct MeshArgs {
     pub sheets: SheetArgs,
     #[command(flatten)]
     pub shape: ShapeArgs,
+    #[command(flatten)]
+    pub periodic: PeriodicPairArgs,
     /// Replace the store if it is there
     #[arg(long, help_heading = "Store")]
     pub force: bool,

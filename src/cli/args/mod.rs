@@ -4,6 +4,7 @@ mod adapt;
 mod field;
 mod import;
 mod mesh;
+mod periodic;
 mod query;
 mod resaturate;
 mod run;
@@ -22,6 +23,7 @@ pub use adapt::AdaptArgs;
 pub use field::{AddFieldArgs, FieldAction, FieldArgs};
 pub use import::ImportArgs;
 pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
+pub use periodic::{PeriodicArgs, PeriodicPairArgs};
 pub use query::QueryArgs;
 pub use resaturate::ResaturateArgs;
 pub use run::RunArgs;
@@ -116,6 +118,11 @@ pub enum Command {
     /// They are added to it under their names, in one step; Ctrl-C leaves it as it was. Outside of the old mesh, values are those of its
     /// nearest point.
     Transfer(TransferArgs),
+    /// Pair labels that are the same at two places, for periodic conditions
+    ///
+    /// Their triangles must be the same up to a translation or a rotation, which is found from them. The mesh does not change: its pairs
+    /// are kept in the store, and exports have them.
+    Periodic(PeriodicArgs),
     /// Keep states of a store under names, compare them, bring them back
     ///
     /// A version has mesh and fields. Files never change, so it copies none: it keeps from removal what later changes replace. Commands that
@@ -192,6 +199,7 @@ impl Command {
             Self::Query(a) => a.json,
             Self::Field(a) => a.is_json(),
             Self::Transfer(a) => a.read.json,
+            Self::Periodic(a) => a.read.json,
             Self::Version(a) => a.read().json,
             Self::Verify(a) => a.read.json,
             Self::Compare(a) => a.read.json,

@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::fields::{Field, fields_of};
+use super::periodic::{Periodic, periodic_of};
 use super::store::at_version;
 use super::versions::kept;
 use super::{Error, Settings, guarded};
@@ -64,6 +65,8 @@ pub struct StoreInfo {
     pub versions: Vec<String>,
     /// Bytes of files that only versions need, besides `previous_bytes`.
     pub version_bytes: u64,
+    /// Periodic pairs of labels, in the order in which they were recorded.
+    pub periodic: Vec<Periodic>,
     /// Fields, in the order in which they were added.
     pub fields: Vec<Field>,
     /// Bytes of the fields' files.
@@ -211,6 +214,7 @@ impl StoreInfo {
             versions: kept.names,
             version_bytes: kept.bytes - kept.alone.get(&BEFORE).copied().unwrap_or(0),
             file_bytes: kept.all_bytes,
+            periodic: periodic_of(catalog)?,
             field_bytes: fields.iter().map(|field| field.bytes).sum(),
             fields,
             catalog_bytes: catalog.file_bytes()?,

@@ -7,12 +7,13 @@ use std::time::Instant;
 use tetdb_schema::code::Code;
 
 use super::field_arrays::FieldArrays;
+use super::periodic::SurfacePairs;
 use super::prediction::Prediction;
 use super::preflight::{self, preflight, scratch_beside, with_free_space};
 use super::store::say_how_locked;
 use super::{
-    Bytes, EmbedOutside, Error, Event, Optimize, Regions, Seal, Settings, Sizes, Store, Subdomains,
-    Surface, SurfaceRemesh, Verification, guarded, job, replace, verify,
+    Bytes, EmbedOutside, Error, Event, Optimize, PeriodicLabels, Regions, Seal, Settings, Sizes,
+    Store, Subdomains, Surface, SurfaceRemesh, Verification, guarded, job, replace, verify,
 };
 use crate::pipeline::{self, MeshOptions, Options, PipelineError, Prepared, RECIPE};
 use tetdb_base::geom::{Point, count};
@@ -59,6 +60,7 @@ pub struct Mesher {
     options: Options,
     settings: Settings,
     existing: Existing,
+    periodic: Vec<PeriodicLabels>,
     preflight: bool,
     verify: bool,
 }
@@ -111,6 +113,7 @@ impl Mesher {
             options: mesh.into(),
             settings: Settings::new(),
             existing: Existing::default(),
+            periodic: Vec::new(),
             preflight: true,
             verify: true,
         }
@@ -200,6 +203,13 @@ impl Mesher {
     /// If they are left out, the store keeps a copy of the surface without them.
     pub fn embed_outside(mut self, outside: EmbedOutside) -> Self {
         self.options.mesh.embed_outside = outside;
+        self
+    }
+
+    /// Records a periodic pair of labels with the store; see [`Store::add_periodic`]. May be repeated. The surface is refused if its triangles
+    /// are no such pair (`not-periodic`).
+    pub fn periodic(mut self, labels: PeriodicLabels) -> Self {
+        self.periodic.push(labels);
         self
     }
 
@@ -347,16 +357,17 @@ impl Mesher {
             self.divide_surface(path, cap, settings)?;
         }
         if self.is_there(path)? {
-            return Ok(Created { path: path.to_owned(), was_there: true, traffic: None });
+            return self.found(path, settings);
         }
         if self.preflight {
             preflight::surface_fits(&self.surface.inner, cap)?;
         }
+        let pairs = SurfacePairs::find(&self.surface.inner, &self.periodic, cap / 2)?;
         let prepared = self.prepare(path, cap, settings)?;
-        let (summary, lock) = match self.mesh(path, cap, prepared, settings) {
+        let (summary, lock) = match self.mesh(path, cap, prepared, &pairs, settings) {
             // Another run was faster, so the store that it left decides.
             Err(error) if error.code() == Code::StoreExists && self.is_there(path)? => {
-                return Ok(Created { path: path.to_owned(), was_there: true, traffic: None });
+                return self.found(path, settings);
             }
             other => other?,
         };
@@ -411,6 +422,15 @@ impl Mesher {
         }
     }
 
+    /// Records the periodic pairs in the finished store of this job that is there.
+    fn found(&self, path: &Path, settings: &Settings) -> Result<Created, Error> {
+        if !self.periodic.is_empty() {
+            let mut store = Store::open_with(path, settings.clone())?;
+            self.periodic.iter().try_for_each(|pair| store.add_periodic(pair).map(|_| ()))?;
+        }
+        Ok(Created { path: path.to_owned(), was_there: true, traffic: None })
+    }
+
     /// Validates the surface, then divides its triangles.
     fn divide_surface(&mut self, path: &Path, cap: u64, settings: &Settings) -> Result<(), Error> {
         let scratch = scratch_beside(&self.surface.inner, cap, path)?;
@@ -462,6 +482,7 @@ impl Mesher {
         path: &Path,
         cap: u64,
         prepared: (Prepared, Option<pipeline::HeadStart>),
+        pairs: &SurfacePairs,
         settings: &Settings,
     ) -> Result<(pipeline::Summary, Arc<WriterLock>), Error> {
         // The old store is replaced only once the new one is sealed.
@@ -472,7 +493,7 @@ impl Mesher {
             false => path.to_owned(),
         };
         let needed = prepared.0.estimate.disk_peak_bytes(cap, n_threads());
-        let mut catalog = self.begin(path, &place, replaces, settings)?;
+        let mut catalog = self.begin(path, &place, replaces, (pairs, settings))?;
         let lock = catalog.lock().expect("it is open for writing");
         say_how_locked(&catalog, settings);
         settings.say(&Event::StoreBegun(place.clone()));
@@ -507,18 +528,22 @@ impl Mesher {
         path: &Path,
         place: &Path,
         replaces: bool,
-        settings: &Settings,
+        (pairs, settings): (&SurfacePairs, &Settings),
     ) -> Result<Catalog, Error> {
         let job = job::job(&self.options.mesh, &self.surface.sources);
         let is_same = |begun: &mut Catalog| {
             begun.job().is_ok_and(|begun| begun == job)
+                && pairs.are_in(begun).is_ok_and(|are_there| are_there)
                 && pipeline::recipe_of(begun).is_ok_and(|recipe| recipe == RECIPE)
         };
         if replaces && let Some(catalog) = replace::take_up(path, is_same)? {
             settings.note(format!("going on with {}", place.display()));
             return Ok(catalog);
         }
-        let catalog = Catalog::create_with(place, &job, pipeline::record_recipe)?;
+        let catalog = Catalog::create_with(place, &job, |step| {
+            pipeline::record_recipe(step);
+            pairs.record(step);
+        })?;
         self.surface.keep_in(place)?;
         if let Some(field) = &self.sizes.field {
             field.keep_in(place)?;

@@ -13,12 +13,16 @@ impl Summary {
     ///
     /// Errors: `no-such-part`.
     pub fn label_called(&self, name: &str) -> Result<u32, Error> {
-        let by_name = self.labels.iter().position(|label| label == name);
-        let by_number = || name.parse().ok().filter(|&n| n < self.labels.len());
-        let number = by_name.or_else(by_number).ok_or_else(|| QueryError::NoLabel {
-            name: name.to_owned(),
-            known: self.labels.clone(),
-        })?;
-        Ok(number as u32)
+        label_among(&self.labels, name)
     }
+}
+
+/// Number of the label named `name`, or with this number. Errors: `no-such-part`.
+pub(super) fn label_among(labels: &[String], name: &str) -> Result<u32, Error> {
+    let by_name = labels.iter().position(|label| label == name);
+    let by_number = || name.parse().ok().filter(|&n| n < labels.len());
+    let number = by_name
+        .or_else(by_number)
+        .ok_or_else(|| QueryError::NoLabel { name: name.to_owned(), known: labels.to_vec() })?;
+    Ok(number as u32)
 }

@@ -166,8 +166,8 @@ impl Store {
         self.write_export(out.as_ref(), options, Some(writers))
     }
 
-    /// Says which fields a file will not have.
-    fn note_fields(
+    /// Says which fields a file will not have, and whether it lacks periodic pairs.
+    fn note_left_out(
         &self,
         catalog: &mut Catalog,
         out: &Path,
@@ -186,6 +186,14 @@ impl Store {
             let (out, names) = (out.display(), names.join(", "));
             self.settings().note(format!("note: {out} is written without {names}: {why}"));
         }
+        let format = write::check(out, selection)?;
+        let has_pairs = selection.has_periodic(format) || format == MeshFormat::Topology;
+        if !has_pairs && selection.content == Content::Mesh && !catalog.periodic()?.is_empty() {
+            let why = "they need one number for each vertex of the whole mesh";
+            let out = out.display();
+            self.settings()
+                .note(format!("note: {out} is written without the periodic pairs: {why}"));
+        }
         Ok(())
     }
 
@@ -202,7 +210,7 @@ impl Store {
             }
             let memory = (settings.cap()? / 2).min(MEMORY_MAX) as usize;
             let mut catalog = open_finished(self.path(), settings)?;
-            self.note_fields(&mut catalog, out, &options.selection)?;
+            self.note_left_out(&mut catalog, out, &options.selection)?;
             let report = write::export_with(
                 &mut catalog,
                 (out, &options.selection),

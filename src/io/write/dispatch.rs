@@ -8,6 +8,7 @@ use super::format::MeshFormat;
 use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::output_files::OutputFiles;
+use super::periodic::WrittenPeriodic;
 use super::report::FileCounts;
 use super::selection::{Content, ElementOrder, ExportSelection};
 use super::writers::{Writers, is_first};
@@ -27,6 +28,10 @@ pub(super) fn write(
         ElementOrder::Second => Some(Midpoints::gather(mesh, format == MeshFormat::Gmsh)?),
     };
     let midpoints = midpoints.as_ref();
+    let periodic = match selection.has_periodic(format) {
+        true => WrittenPeriodic::gather(mesh, midpoints, mesh.memory as u64 / 4)?,
+        false => WrittenPeriodic::default(),
+    };
     let mut counts = FileCounts {
         vertices: mesh.n_vertices() + midpoints.map_or(0, Midpoints::n),
         tets: mesh.n_tets(),
@@ -50,11 +55,13 @@ pub(super) fn write(
         }
         MeshFormat::Medit => medit::write_text(mesh, outputs, out)?,
         MeshFormat::MeditBinary => medit::write_binary(mesh, outputs, out)?,
-        MeshFormat::Gmsh => counts = gmsh::write(mesh, outputs, out, (selection, midpoints))?,
+        MeshFormat::Gmsh => {
+            counts = gmsh::write(mesh, outputs, out, (selection, midpoints, &periodic))?
+        }
         MeshFormat::Gmsh22 => gmsh22::write(mesh, outputs, out)?,
         MeshFormat::Abaqus => abaqus::write(mesh, outputs, out, midpoints)?,
         MeshFormat::Su2 => counts.triangles = su2::write(mesh, outputs, out)?,
-        MeshFormat::Numpy => npy_columns::write(mesh, outputs, out)?,
+        MeshFormat::Numpy => npy_columns::write(mesh, outputs, out, &periodic)?,
         #[cfg(feature = "parquet")]
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),
         MeshFormat::OpenFoam => counts = foam::write(mesh, outputs, out, selection)?,
@@ -75,6 +82,9 @@ pub(super) fn write(
     let lacks_points = format == MeshFormat::TetGen && !mesh.embedded().points.is_empty();
     if (!has_lines || lacks_points) && selection.content == Content::Mesh {
         write_list(mesh, outputs, out)?;
+    }
+    if !matches!(format, MeshFormat::Gmsh | MeshFormat::Numpy) {
+        periodic.write_list(mesh, outputs, out)?;
     }
     mesh.report_end();
     Ok(counts)

@@ -71,7 +71,7 @@ pub(super) struct OpenedPart {
 ///
 /// Shape: `parts` by rank. Each pass reads every chunk once and holds a quarter of the memory.
 pub(super) struct Merged<'a> {
-    store: &'a mut Catalog,
+    pub(super) store: &'a mut Catalog,
     parts: Vec<Source>,
     regions: BTreeSet<u32>,
     numbering: Numbering,
@@ -87,7 +87,7 @@ pub(super) struct Merged<'a> {
     /// Fields at vertices and at tetrahedra that are read with them.
     fields: [Vec<FieldRow>; 2],
     dir: PathBuf,
-    memory: usize,
+    pub(super) memory: usize,
     progress: ReadProgress<'a>,
     /// Sub-domains whose vertices and tetrahedra are read, by place.
     window: Range<usize>,

@@ -13,7 +13,7 @@ use tetdb_store::sealed::MergeReader;
 /// The edges of a tetrahedron in VTK's and Abaqus's order of midpoints.
 pub(super) const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
 /// The edges of a triangle in the same order.
-const FACE_EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [0, 2]];
+pub(super) const FACE_EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [0, 2]];
 /// First place of the edges of boundary faces; those of tetrahedra come before.
 const FACE: u64 = 1 << 63;
 /// First place of the embedded edges.

@@ -36,6 +36,7 @@ mod numbering;
 mod output_files;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod periodic;
 mod pieces;
 mod read_progress;
 mod report;

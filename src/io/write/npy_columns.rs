@@ -10,6 +10,7 @@ use super::faces::MergedFace;
 use super::merged::{Measured, Merged, MergedTet};
 use super::npy::{HEAD_BYTES, head};
 use super::output_files::OutputFiles;
+use super::periodic::WrittenPeriodic;
 use super::stream::Strip;
 use tetdb_schema::record::SealedVertex;
 
@@ -74,7 +75,12 @@ where
     }
 }
 
-pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
+pub(super) fn write(
+    mesh: &mut Merged,
+    outputs: &mut OutputFiles,
+    out: &Path,
+    periodic: &WrittenPeriodic,
+) -> Result<()> {
     mesh.expect_passes(1, 1);
     let n_vertices = mesh.n_vertices();
     type VertexRow = (SealedVertex, Vec<u64>);
@@ -107,5 +113,21 @@ pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) ->
     ];
     let mut arrays = Arrays::create(outputs, out, mesh.n_faces(), columns)?;
     mesh.faces().each(|face| arrays.row(face))?;
+    arrays.finish()?;
+    if periodic.0.is_empty() {
+        return Ok(());
+    }
+    type Pair = (u32, [u64; 2], u64);
+    let columns = vec![
+        vertex_numbers("periodic", n_vertices, |pair: &Pair| pair.1),
+        column("periodic_pair", |pair: &Pair| pair.0),
+        vertex_numbers("periodic_least", n_vertices, |pair: &Pair| [pair.2]),
+    ];
+    let (n, least) =
+        (periodic.0.iter().map(|link| link.nodes.len() as u64).sum(), periodic.least());
+    let mut arrays = Arrays::create(outputs, out, n, columns)?;
+    for (pair, link) in (0..).zip(&periodic.0) {
+        link.nodes.iter().try_for_each(|nodes| arrays.row(&(pair, *nodes, least[&nodes[0]])))?;
+    }
     arrays.finish()
 }

@@ -71,6 +71,12 @@ impl ExportSelection {
         format == MeshFormat::VtkHdf && !self.one_partition
     }
 
+    /// Returns whether the periodic pairs of the store are written: where every vertex has one number.
+    pub fn has_periodic(&self, format: MeshFormat) -> bool {
+        let is_numbered = !self.in_pieces(format) && !self.is_apart(format) && !self.split_sheets;
+        self.content == Content::Mesh && is_numbered
+    }
+
     /// Returns whether this process writes the file that names all pieces.
     pub(super) fn writes_head(&self) -> bool {
         self.share.is_none_or(|share| share.number == 1)

@@ -8,6 +8,7 @@
 mod catalog;
 mod error;
 mod fields;
+mod periodic;
 mod step;
 #[cfg(test)]
 mod tests;

@@ -19,6 +19,7 @@ use super::error::Result;
 use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::output_files::OutputFiles;
+use super::periodic::WrittenPeriodic;
 use super::report::FileCounts;
 use super::selection::ExportSelection;
 use entities::Entities;
@@ -32,7 +33,7 @@ pub(super) fn write(
     mesh: &mut Merged,
     outputs: &mut OutputFiles,
     out: &Path,
-    (selection, midpoints): (&ExportSelection, Option<&Midpoints>),
+    (selection, midpoints, periodic): (&ExportSelection, Option<&Midpoints>, &WrittenPeriodic),
 ) -> Result<FileCounts> {
     mesh.expect_passes(1, 1);
     let ghosts = match selection.ghosts {
@@ -44,14 +45,15 @@ pub(super) fn write(
     if !selection.pieces {
         let all: Vec<usize> = (0..mesh.n_parts()).collect();
         let piece = GmshPiece { which: &all, midpoints, foreign };
-        return write_file(mesh, outputs, out, &piece, (selection.ascii, ghosts));
+        return write_file(mesh, outputs, out, &piece, (selection.ascii, ghosts, periodic));
     }
     let mut counts = FileCounts::default();
     for (p, part) in mesh.parts().into_iter().enumerate() {
         if selection.writes_piece(part.rank) {
             let path = piece_path(out, part.rank);
             let piece = GmshPiece { which: &[p], midpoints, foreign };
-            counts += write_file(mesh, outputs, &path, &piece, (selection.ascii, ghosts))?;
+            counts +=
+                write_file(mesh, outputs, &path, &piece, (selection.ascii, ghosts, periodic))?;
         }
     }
     Ok(counts)
@@ -69,7 +71,7 @@ fn write_file(
     outputs: &mut OutputFiles,
     path: &Path,
     piece: &GmshPiece,
-    (ascii, ghosts): (bool, Option<&Ghosts>),
+    (ascii, ghosts, periodic): (bool, Option<&Ghosts>, &WrittenPeriodic),
 ) -> Result<FileCounts> {
     let entities = Entities::gather(mesh, piece)?;
     let n_tets = entities.n_tets();
@@ -100,9 +102,33 @@ fn write_file(
     }
     out.section("Nodes", |out| nodes.write(out, &entities))?;
     out.section("Elements", |out| elements::write(mesh, out, piece, &entities))?;
+    if !periodic.0.is_empty() {
+        out.section("Periodic", |out| write_periodic(out, periodic))?;
+    }
     if let Some(ghosts) = ghosts {
         out.section("GhostElements", |out| ghosts.write(out, piece.which, mesh))?;
     }
     out.finish()?;
     Ok(FileCounts { vertices: nodes.n, tets: n_tets, triangles: entities.n_faces() })
+}
+
+/// Writes for each pair of labels the moved surface and its master, the motion from the master, and the nodes with their masters.
+fn write_periodic(out: &mut Out, periodic: &WrittenPeriodic) -> Result<()> {
+    out.size(periodic.0.len() as u64);
+    out.end()?;
+    for link in &periodic.0 {
+        let [first, second] = link.row.labels.map(|label| label + 1);
+        [2, second, first].into_iter().for_each(|n| out.int(n));
+        out.end()?;
+        out.size(16);
+        link.matrix().into_iter().for_each(|x| out.double(x));
+        out.end()?;
+        out.size(link.nodes.len() as u64);
+        out.end()?;
+        for [a, b] in &link.nodes {
+            [b + 1, a + 1].into_iter().for_each(|n| out.size(n));
+            out.end()?;
+        }
+    }
+    Ok(())
 }

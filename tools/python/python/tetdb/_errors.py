@@ -100,6 +100,7 @@ _CLASSES: dict[str, type[TetdbError]] = {
         "contradicting-orientation",
         "surface-changed",
         "bad-field",
+        "not-periodic",
         "bad-mesh",
         "bad-seed",
         "sheet-outside",
