@@ -9,7 +9,7 @@ use serde_json::json;
 use tetdb::data::Hit;
 use tetdb::{
     CancelToken, ColorBy, ErrorEstimate, ExportOptions, FieldIds, FieldPlace, FieldSource,
-    NewField, Order, Snapshot, TransferMethod, VerifyLevel, Word,
+    MotionKind, NewField, Order, PeriodicLabels, Snapshot, TransferMethod, VerifyLevel, Word,
 };
 
 use crate::arrow::ArrowStream;
@@ -504,6 +504,51 @@ impl Store {
     /// Two versions compared, as JSON.
     fn diff_versions(&self, py: Python<'_>, first: &str, second: &str) -> PyResult<String> {
         self.alone(py, |store| Ok(json!(store.diff_versions(first, second)?).to_string()))
+    }
+
+    /// The periodic pairs, as JSON.
+    fn periodic(&self, py: Python<'_>) -> PyResult<String> {
+        self.alone(py, |store| Ok(json!(store.periodic()?).to_string()))
+    }
+
+    /// Lasting ids of the vertices of the periodic pair at a place in the list; shape (pairs, 2).
+    fn periodic_vertices<'py>(
+        &self,
+        py: Python<'py>,
+        place: usize,
+    ) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let pairs = self.alone(py, |store| {
+            let all = store.periodic()?;
+            let pair = all.get(place).map(|pair| store.periodic_vertices(pair)).transpose()?;
+            Ok(pair.unwrap_or_default())
+        })?;
+        let array = PyArray2::zeros(py, [pairs.len(), 2], false);
+        let mut rows = array.try_readwrite()?;
+        for (number, id) in rows.as_slice_mut()?.iter_mut().zip(pairs.iter().flatten()) {
+            *number = id.number().cast_signed();
+        }
+        drop(rows);
+        Ok(array)
+    }
+
+    fn add_periodic(
+        &self,
+        py: Python<'_>,
+        labels: [String; 2],
+        kind: Option<&str>,
+        tolerance: Option<f64>,
+    ) -> PyResult<()> {
+        let [first, second] = labels;
+        let mut labels = PeriodicLabels::new(first, second);
+        if let Some(kind) = kind {
+            let turns = kind == "rotate";
+            labels =
+                labels.kind(if turns { MotionKind::Rotation } else { MotionKind::Translation });
+        }
+        if let Some(tolerance) = tolerance {
+            labels = labels.tolerance(tolerance);
+        }
+        self.changed(py, None, |mut store| Ok(store.add_periodic(&labels).map(drop)?))
     }
 
     fn undo(&self, py: Python<'_>) -> PyResult<()> {

@@ -827,6 +827,26 @@ class Store:
         self._changed(work)
         return list(json.loads(said))
 
+    @property
+    def periodic(self) -> list[dict[str, Any]]:
+        """The periodic pairs: for each `first` and `second`, the names of its labels, the `map` from the one to the other (three rows of
+        four), the `angle` of a rotation in radians, counts, and `pairs`, an array of shape (n, 2) of lasting ids of vertices.
+        """
+        found = json.loads(self._native.periodic())
+        return [{**pair, "pairs": self._native.periodic_vertices(place)} for place, pair in enumerate(found)]
+
+    def add_periodic(
+        self, first: str, second: str, kind: str | None = None, tolerance: float | None = None
+    ) -> None:
+        """Records that the triangles of the label `first` are those of `second`, moved; the mesh does not change.
+
+        The motion is found from the triangles; `kind`, "translate" or "rotate", chooses where both would do. `tolerance` is in units of
+        the input, by default a millionth of the diagonal around both labels. Raises `SurfaceError` with the code `not-periodic` where something has no partner.
+        """
+        if kind not in (None, "translate", "rotate"):
+            raise _options.usage(f"{kind!r} is no motion: expected 'translate' or 'rotate'", "kind")
+        self._changed(lambda: self._native.add_periodic((first, second), kind, tolerance))
+
     def repair(self, subdomains: Sequence[int] = ()) -> None:
         """Meshes damaged sub-domains again as they were; without a list, all that are damaged."""
         ranks = _options.ranks(subdomains, "subdomains")
