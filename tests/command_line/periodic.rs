@@ -105,6 +105,6 @@ fn what_is_no_pair_is_refused_with_its_place() {
     assert_eq!((done.exit(), &done.error()["code"]), (Some(3), &"not-periodic".into()));
     let text = done.error()["message"].as_str().expect("text").to_owned();
     assert!(text.contains("has no partner: moved to ("), "{text}");
-    assert!(done.error()["place"].as_str().is_some_and(|at| at.starts_with('(')));
+    assert!(done.error()["where"].as_str().is_some_and(|at| at.starts_with('(')));
     assert_eq!(place.names(), names);
 }
