@@ -108,3 +108,24 @@ fn what_is_no_pair_is_refused_with_its_place() {
     assert!(done.error()["where"].as_str().is_some_and(|at| at.starts_with('(')));
     assert_eq!(place.names(), names);
 }
+
+#[test]
+fn tolerances_of_any_size_end_in_pairs_or_in_words() {
+    let place = Place::new();
+    place.run_line(&format!("mesh {BOX} -o a.tetdb --no-verify")).succeeds();
+    // Wrong labels, and no distance at all: nothing is looked for without end.
+    let done =
+        place.run_line("periodic a.tetdb x-low=y-low:translate --periodic-tolerance 0 --json");
+    let text = done.error()["message"].as_str().expect("text").to_owned();
+    assert!(text.contains("allowed is 0"), "{text}");
+    // Farther than vertices are from each other, two have the same partner.
+    let done = place.run_line("periodic a.tetdb x-low=x-high:rotate --periodic-tolerance 9 --json");
+    assert_eq!(done.error()["code"], "not-periodic");
+    // What is on record stays as it is, and nobody has to wait for it.
+    let again = format!("mesh {BOX} -o b.tetdb --no-verify --periodic x-low=x-high");
+    place.run_line(&again).succeeds();
+    let before = std::fs::read(place.path("b.tetdb").join("catalog.redb")).expect("the catalog");
+    place.run_line(&again).succeeds();
+    let after = std::fs::read(place.path("b.tetdb").join("catalog.redb")).expect("the catalog");
+    assert!(before == after, "the catalog was written");
+}

@@ -20,8 +20,13 @@ const TOLERANCE: f64 = 1e-6;
 const ALIKE: f64 = 1e-3;
 /// Rotations by less, in radians, are taken for translations.
 const ANGLE_MIN: f64 = 1e-6;
-/// Candidates that are looked at to say what is wrong, where none is right.
+/// Candidates that are looked at to say what is wrong, where none is right, and vertices of each.
 const EXPLAINED: usize = 16;
+const LOST_MAX: usize = 100;
+/// Rotations that are tried at most: a sphere of equal triangles has more than memory holds.
+const TURNS_MAX: usize = 100_000;
+/// The sum of the normals of a label that bounds a domain on one side is longer, as a share of its area.
+const CLOSED: f64 = 1e-6;
 
 /// A triangle of a label: its number in the input, and its vertices.
 #[derive(Clone, Copy, Debug)]
@@ -76,8 +81,8 @@ impl Patch {
         self.triangles[t].map(|v| self.points[v as usize])
     }
 
-    /// The centroid of area, and the sum of the triangles' normals, each as long as its doubled area.
-    fn center(&self) -> (Point, Point) {
+    /// The centroid of area; the sum of the triangles' normals, each as long as its doubled area; and the sum of the doubled areas.
+    fn center(&self) -> (Point, Point, f64) {
         let (mut center, mut total, mut normal) = (Point::ZERO, 0.0, Point::ZERO);
         let origin = self.points[0];
         for t in 0..self.triangles.len() {
@@ -87,7 +92,7 @@ impl Patch {
             total += doubled.length();
             normal += doubled;
         }
-        (origin + center / total, normal)
+        (origin + center / total, normal, total)
     }
 }
 
@@ -226,16 +231,22 @@ impl<'a> Matcher<'a> {
 
     /// The motions to try, in their order.
     fn candidates(&self, kind: Option<MotionKind>) -> Vec<Motion> {
-        let [(a, normal_a), (b, normal_b)] = [self.from.center(), self.to.center()];
+        let [(a, normal_a, _), (b, normal_b, area)] = [self.from.center(), self.to.center()];
+        // Of a closed label nothing but rounding is left.
+        let has_side = normal_b.length() > CLOSED * area;
         let motion = |turn: DMat3, angle| Motion {
             turn,
             shift: b - turn * a,
             angle,
-            is_alike: (turn * normal_a).dot(normal_b) > 0.5 * normal_b.length_squared(),
+            is_alike: has_side && (turn * normal_a).dot(normal_b) > 0.5 * normal_b.length_squared(),
         };
         let mut all = Vec::new();
         if kind != Some(MotionKind::Rotation) {
-            all.push(motion(DMat3::IDENTITY, 0.0));
+            let translation = motion(DMat3::IDENTITY, 0.0);
+            if !translation.is_alike && matches!(self.pairs(&translation), Ok(Some(_))) {
+                return vec![translation];
+            }
+            all.push(translation);
         }
         if kind != Some(MotionKind::Translation) {
             let (radius, turns) = self.turns(a, b);
@@ -271,7 +282,11 @@ impl<'a> Matcher<'a> {
         for p in at(radius) {
             check_cancelled();
             let seconds = seconds.iter().filter(|q| (q.distance(p) - w.distance(v)).abs() <= alike);
-            turns.extend(seconds.map(|&q| frame(p - b, q - b) * own));
+            let left = TURNS_MAX - turns.len();
+            turns.extend(seconds.take(left).map(|&q| frame(p - b, q - b) * own));
+            if turns.len() == TURNS_MAX {
+                break;
+            }
         }
         (radius, turns)
     }
@@ -317,27 +332,25 @@ impl<'a> Matcher<'a> {
         best.map(|(distance, v)| (v, distance))
     }
 
-    /// The vertex that is farthest from a partner, under the candidate where that is least.
+    /// A vertex without a partner under the candidate that leaves the fewest without; of the first ones the farthest.
     fn explain(&self, candidates: &[Motion]) -> UnpairedPart {
-        let worst = |motion: &Motion| {
-            let lost = |&p: &Point| {
-                let (moved, mut radius) = (motion.apply(p), self.tolerance);
-                loop {
-                    match self.nearest(moved, radius) {
-                        Some((_, distance)) => break distance,
-                        None if radius.is_infinite() => break radius,
-                        None => radius *= 4.0,
-                    }
-                }
+        let lost = |motion: &Motion| {
+            let mut is_taken = vec![false; self.to.points.len()];
+            let is_lost = |&v: &usize| {
+                check_cancelled();
+                let found = self.nearest(motion.apply(self.from.points[v]), self.tolerance);
+                found.is_none_or(|(v, _)| std::mem::replace(&mut is_taken[v as usize], true))
             };
-            let lost = self.from.points.iter().map(lost).enumerate();
-            lost.fold((0, 0.0), |worst, now| if now.1 > worst.1 { now } else { worst })
+            (0..self.from.points.len()).filter(is_lost).collect::<Vec<usize>>()
         };
-        let tried = candidates.iter().take(EXPLAINED).map(|motion| (motion, worst(motion)));
-        let best = tried.min_by(|a, b| a.1.1.total_cmp(&b.1.1));
         let still =
             Motion { turn: DMat3::IDENTITY, shift: Point::ZERO, angle: 0.0, is_alike: false };
-        let (motion, (v, distance)) = best.unwrap_or_else(|| (&still, worst(&still)));
+        let tried = candidates.iter().take(EXPLAINED).map(|motion| (motion, lost(motion)));
+        let (motion, lost) =
+            tried.min_by_key(|(_, lost)| lost.len()).unwrap_or_else(|| (&still, lost(&still)));
+        let far = lost.into_iter().take(LOST_MAX);
+        let far = far.map(|v| (v, self.distance(motion.apply(self.from.points[v]))));
+        let (v, distance) = far.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0));
         let at = self.from.points[v];
         UnpairedPart::Vertex {
             number: self.from.vertices[v],
@@ -346,6 +359,11 @@ impl<'a> Matcher<'a> {
             distance,
             tolerance: self.tolerance,
         }
+    }
+
+    /// The distance to the nearest vertex of `to`.
+    fn distance(&self, p: Point) -> f64 {
+        self.to.points.iter().map(|q| q.distance(p)).fold(f64::INFINITY, f64::min)
     }
 
     /// The pairs as numbers of the input, and a translation as the mean of all pairs.

@@ -426,7 +426,11 @@ impl Mesher {
     fn found(&self, path: &Path, settings: &Settings) -> Result<Created, Error> {
         if !self.periodic.is_empty() {
             let mut store = Store::open_with(path, settings.clone())?;
-            self.periodic.iter().try_for_each(|pair| store.add_periodic(pair).map(|_| ()))?;
+            for pair in &self.periodic {
+                if !store.has_periodic(pair)? {
+                    store.add_periodic(pair)?;
+                }
+            }
         }
         Ok(Created { path: path.to_owned(), was_there: true, traffic: None })
     }

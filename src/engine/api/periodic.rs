@@ -156,6 +156,22 @@ impl Store {
         })
     }
 
+    /// Returns whether the pair is on record already, by such a motion. Errors: as [`Store::add_periodic`].
+    pub(super) fn has_periodic(&self, labels: &PeriodicLabels) -> Result<bool, Error> {
+        let summary = self.summary();
+        let numbers = numbers_of(labels, &summary.labels, &summary.label_sets)?;
+        let is_meant = |row: &PeriodicRow| {
+            let kind = match row.angle {
+                0.0 => MotionKind::Translation,
+                _ => MotionKind::Rotation,
+            };
+            row.labels == numbers
+                && labels.kind.is_none_or(|wanted| wanted == kind)
+                && labels.tolerance.is_none_or(|most| row.deviation <= most)
+        };
+        Ok(self.periodic()?.iter().any(|pair| is_meant(&pair.row)))
+    }
+
     /// Removes a periodic pair from the record. Errors: `no-such-part`; `busy`.
     pub fn drop_periodic(&mut self, labels: &PeriodicLabels) -> Result<(), Error> {
         let numbers = [&labels.first, &labels.second];
@@ -250,9 +266,13 @@ fn numbers_of(
             return Err(Error::new(Code::NotPeriodic, message).with_help(help));
         }
     }
-    if numbers[0] == numbers[1] || labels.tolerance.is_some_and(|t| !(t.is_finite() && t >= 0.0)) {
-        let message = "a periodic pair has two labels and a tolerance that is a length";
+    if numbers[0] == numbers[1] {
+        let message = format!("{} is no pair with itself", labels.first);
         return Err(Error::new(Code::NotPeriodic, message).with_help("name another label"));
+    }
+    if let Some(tolerance) = labels.tolerance.filter(|t| !(t.is_finite() && *t >= 0.0)) {
+        let message = format!("the tolerance of a periodic pair is {tolerance}");
+        return Err(Error::new(Code::NotPeriodic, message).with_help("give a length"));
     }
     Ok(numbers)
 }
@@ -301,6 +321,13 @@ fn matched(labels: &PeriodicLabels, patches: &[Patch; 2]) -> Result<PeriodicMatc
             format!("{name} has {} triangles", patch.n_triangles())
         });
         let (message, place) = match what {
+            UnpairedPart::Vertex { number, at, distance, tolerance, .. } if distance <= tolerance => (
+                format!(
+                    "vertex {number} of {from} and another one have the same partner within {}; allow a smaller distance",
+                    short(tolerance)
+                ),
+                show(at),
+            ),
             UnpairedPart::Vertex { number, at, moved, distance, tolerance } => (
                 format!(
                     "vertex {number} of {from} has no partner: moved to {}, it is {} from the nearest vertex of {to}, allowed is {}; {}",

@@ -119,13 +119,33 @@ fn field_of_surface(
     let scratch = scratch_beside(&tetdb_base::surface::Surface::default(), cap, &dir)?;
     let job = open.job()?;
     let surface = match job.is_imported() {
-        true => attempt(|| pipeline::shells(open, &scratch))??,
+        true => {
+            refuse_regions(open, &all.mesh.sizes)?;
+            attempt(|| pipeline::shells(open, &scratch))??
+        }
         false => Surface::of_record(&job.surfaces, &dir, &scratch)?.inner,
     };
     drop(scratch);
     let prepared = predict(&surface, all, cap, &dir)?;
     settings.note(prepared.sizes.to_string());
     Ok(prepared.field)
+}
+
+/// Errors: lengths in a region, which the shells of an imported mesh do not tell apart.
+fn refuse_regions(open: &mut Catalog, sizes: &SizeOptions) -> Result<(), Error> {
+    let names = open.region_names()?;
+    let is_region =
+        |which: &str| which.parse::<usize>().is_ok() || names.iter().any(|name| name == which);
+    match sizes.regions.iter().find(|size| is_region(&size.which)) {
+        None => Ok(()),
+        Some(size) => {
+            let message =
+                format!("region {} of an imported mesh has no surface of its own", size.which);
+            Err(Error::new(Code::NoSuchPart, message).with_help(
+                "give lengths in shapes, such as --size-sphere, or for whole sub-domains, with --subdomain and --hsiz",
+            ))
+        }
+    }
 }
 
 /// Least and greatest length. Shares refer to the diagonal of the bounding box of all sub-domains. Errors: the two cross.

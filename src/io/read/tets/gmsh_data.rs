@@ -48,19 +48,25 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
             FieldPlace::Tets => (sink.mesh.tets.len(), &mut sink.elements),
         };
         let mesh = &mut *sink.mesh;
-        let field = match sink.takes.is_some_and(|takes| takes(&name)) {
+        // Values before their vertices or tetrahedra, or of numbers that no table holds, are left out.
+        let is_usable = total > 0 && known.prepare(&mesh.space, &numbers.feed).is_ok();
+        let field = match is_usable && sink.takes.is_some_and(|takes| takes(&name)) {
             true => mesh.field(&name, place, FieldNumber::F64, components as usize),
             false => None,
         };
         if let Some(field) = field {
             (0..total as u64 * components).for_each(|_| mesh.fields[field].words.push(0));
         }
-        let (mut seen, mut n_seen) = (vec![false; if field.is_some() { total } else { 0 }], 0);
+        let n_seen_at = if field.is_some() { total } else { 0 };
+        let (mut seen, mut n_seen) = (mesh.space.vec(n_seen_at, 0u8), 0);
         for i in 0..n {
             numbers.need_record("values", n, i)?;
             let tag = numbers.int()?;
             // Elements that are no tetrahedra have no number here.
-            let at = known.find(tag, &mesh.space, &numbers.feed).ok();
+            let at = match field {
+                Some(_) => known.find(tag, &mesh.space, &numbers.feed).ok(),
+                None => None,
+            };
             let at = at.map(|at| at as usize).filter(|&at| at < seen.len());
             for k in 0..components as usize {
                 let word = numbers.value()?.to_bits();
@@ -69,7 +75,8 @@ impl<R: BufRead> GmshReader<'_, '_, R> {
                 }
             }
             if let Some(at) = at {
-                n_seen += usize::from(!std::mem::replace(&mut seen[at], true));
+                n_seen += usize::from(seen.get(at) == 0);
+                seen.set(at, 1);
             }
         }
         if field.is_some() && n_seen < total {

@@ -191,8 +191,18 @@ impl RawMesh {
         }
     }
 
-    /// Ends reading: counts become notes.
+    /// Ends reading: counts become notes, and fields without a value for each vertex or tetrahedron are left out.
     pub(super) fn end(&mut self) {
+        let [n_points, n_tets] = [self.points.len(), self.tets.len()];
+        let is_whole = |field: &RawField| {
+            let n = if field.place == FieldPlace::Vertices { n_points } else { n_tets };
+            field.words.len() == n * field.components as usize
+        };
+        let (whole, partial) = std::mem::take(&mut self.fields).into_iter().partition(is_whole);
+        self.fields = whole;
+        let partial: Vec<RawField> = partial;
+        self.leave_out(&partial.iter().map(|field| &*field.name).collect::<Vec<_>>());
+
         for (n, text) in [
             (self.n_thin, "[line or point was|lines and points were] left out"),
             (
@@ -236,6 +246,14 @@ impl NodeNumbers {
         self.n += 1;
     }
 
+    /// Makes the table of the numbers, if it is missing and needed. Errors: two nodes have one number; the numbers are too far apart.
+    pub fn prepare<R: BufRead>(&mut self, space: &ScratchSpace, feed: &Feed<R>) -> Result<()> {
+        match self.sparse.is_some() && self.table.is_none() {
+            true => self.build(space, feed),
+            false => Ok(()),
+        }
+    }
+
     /// The position of a node. Errors: there is no such node; two have one number.
     #[inline]
     pub fn find<R: BufRead>(
@@ -244,9 +262,7 @@ impl NodeNumbers {
         space: &ScratchSpace,
         feed: &Feed<R>,
     ) -> Result<u32> {
-        if self.sparse.is_some() && self.table.is_none() {
-            self.build(space, feed)?;
-        }
+        self.prepare(space, feed)?;
         let (low, n) = match &mut self.table {
             None => (self.first, u64::from(self.n)),
             Some((low, table)) => {

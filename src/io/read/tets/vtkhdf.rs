@@ -12,6 +12,10 @@ use super::hdf_rows::kind;
 use super::vtu::{ArrayAt, Grid, Piece};
 use super::{FilePlace, MeshFields, RawMesh, ReadError, ReadFault, Result};
 
+/// Bytes of an array of a partition, with its names.
+const PIECE_ARRAY_BYTES: u64 = 256;
+
+/// Reads a file. Errors: what is no such grid; time steps; more partitions than the memory holds.
 pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
     let cap = mesh.space.cap() as usize;
     let place = FilePlace::new(path);
@@ -22,7 +26,7 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
         .with_max_read_bytes(cap / 16);
     let open = || Hdf5File::from_storage_with_options(Arc::new(FileStorage::open(path)?), options);
     let file = open().map_err(|e| refuse(&place, "an HDF5 file", &e))?;
-    let pieces = pieces(&file, &place)?;
+    let pieces = pieces(&file, cap as u64 / 16, &place)?;
     Grid::of_hdf(path, file, pieces).read(fields, mesh)
 }
 
@@ -31,8 +35,8 @@ fn refuse(place: &FilePlace, what: &str, error: &hdf5_reader::error::Error) -> R
     place.refuse(ReadFault::Unexpected { expected, found })
 }
 
-/// The partitions of a file, and their share of each array.
-fn pieces(file: &Hdf5File, place: &FilePlace) -> Result<Vec<Piece>> {
+/// The partitions of a file, and their share of each array. Errors: they take more than `limit` bytes.
+fn pieces(file: &Hdf5File, limit: u64, place: &FilePlace) -> Result<Vec<Piece>> {
     let root = file.group("VTKHDF").map_err(|e| refuse(place, "a group VTKHDF", &e))?;
     let kind = root.attribute("Type").and_then(|kind| kind.read_string());
     let kind = kind.map_err(|e| refuse(place, "an attribute Type of VTKHDF", &e))?;
@@ -58,6 +62,15 @@ fn pieces(file: &Hdf5File, place: &FilePlace) -> Result<Vec<Piece>> {
         let (what, found) = ("partitions", format!("{} with cells", n_cells.len()));
         let declared = n_points.len().to_string();
         return Err(place.refuse(ReadFault::CountMismatch { what, declared, found }));
+    }
+    let needed = (n_points.len() * (arrays.len() + 1)) as u64 * PIECE_ARRAY_BYTES;
+    if needed > limit {
+        let what = "the partitions of the file";
+        return Err(place.refuse(ReadFault::TooLarge { what, needed, limit }));
+    }
+    let n_all = n_points.iter().fold(0u64, |sum, &n| sum.saturating_add(n));
+    if n_all > u64::from(u32::MAX) {
+        return Err(place.refuse(ReadFault::Unsupported(format!("a mesh of {n_all} vertices"))));
     }
     let (mut first, mut pieces) = ([0u64; 4], Vec::new());
     for (number, ((&points, &cells), &corners)) in
