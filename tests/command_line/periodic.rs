@@ -119,7 +119,8 @@ fn tolerances_of_any_size_end_in_pairs_or_in_words() {
     let text = done.error()["message"].as_str().expect("text").to_owned();
     assert!(text.contains("allowed is 0"), "{text}");
     // Farther than vertices are from each other, two have the same partner.
-    let done = place.run_line("periodic a.tetdb x-low=x-high:rotate --periodic-tolerance 9 --json");
+    let done =
+        place.run_line("periodic a.tetdb x-low=y-low:translate --periodic-tolerance 9 --json");
     assert_eq!(done.error()["code"], "not-periodic");
     // What is on record stays as it is, and nobody has to wait for it.
     let again = format!("mesh {BOX} -o b.tetdb --no-verify --periodic x-low=x-high");

@@ -25,9 +25,11 @@ const EDGE: f64 = 0.93;
 const HEIGHT_MIN: f64 = 0.6;
 /// A larger circumcenter than this is no place for a point, even if it lies inside.
 const CENTER_MAX: f64 = 1.3;
-/// Farthest place of a point from the nearest corner of its tetrahedron, in the length wanted there. Circumcenters of flat tetrahedra lie anywhere;
-/// where all is divided they are beyond a required face or too near to others, and looking for them leads out of every region.
-const FAR: f64 = 4.0;
+/// Farthest place of a point from the nearest corner of its tetrahedron, in the greater of the lengths wanted at both. Circumcenters of flat
+/// tetrahedra lie anywhere; where all is divided they are beyond a required face or too near to others, and looking for them leads out of
+/// every region. Where lengths grow from tiny ones, farther points by the corner's length alone are needed: without them walls of needles keep
+/// worse tetrahedra.
+const FAR: f64 = 6.0;
 /// Mark of good tetrahedra.
 pub(super) const GOOD: usize = crate::mesh::anatomy::mark::RESCUED;
 
@@ -107,7 +109,7 @@ impl Spawner {
         let corners = mesh.corners(mesh.tet(tet));
         let squares = corners.map(|v| (v.point - point).length_squared());
         let is_near = (0..4).any(|i| candidate.refuses(squares[i], corners[i].h()));
-        let is_far = (0..4).all(|i| squares[i].sqrt() > FAR * f64::from(corners[i].h()));
+        let is_far = (0..4).all(|i| squares[i].sqrt() > FAR * h.max(f64::from(corners[i].h())));
         if !is_near && !is_far && field.place.admits(point, h) {
             self.found.push((order.index(point), candidate));
         }
