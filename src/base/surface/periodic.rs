@@ -156,7 +156,7 @@ pub struct Unpaired {
 /// Kinds of what has no partner.
 #[derive(Clone, Debug, PartialEq)]
 pub enum UnpairedPart {
-    /// The vertex that is farthest from a partner.
+    /// A vertex without a partner: of the first ones, the farthest from one.
     Vertex {
         /// Number of the vertex in the input.
         number: u32,

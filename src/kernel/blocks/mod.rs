@@ -241,7 +241,7 @@ impl Visits<'_, '_> {
 
     /// Divides what no block could, in wider and wider regions. There is little of it, if any; returns how many tetrahedra are left.
     ///
-    /// What a point changes is connected, so the regions are grown from brick to brick. Margins in lengths would take the whole of a scan:
+    /// A point changes connected tetrahedra alone, so regions are grown from brick to brick. Margins in lengths would take the whole of a scan:
     /// where lengths grow from a fine surface inwards, much lies within a few of the lengths inside.
     fn finish_rest(&self) -> u64 {
         let mut visitor = Visitor::new();

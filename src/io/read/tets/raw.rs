@@ -47,7 +47,7 @@ pub struct RawMesh {
 pub struct RawField {
     /// Its name.
     pub name: String,
-    /// Whether they belong to vertices or tetrahedra.
+    /// Where the values are: at vertices or at tetrahedra.
     pub place: FieldPlace,
     /// Type of the numbers.
     pub number: FieldNumber,
