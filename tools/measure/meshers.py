@@ -3,6 +3,7 @@
 Every run gives points, tetrahedra and CPU seconds. What is timed:
   tetdb       the whole process: surface file read and validated, sizes, estimate, mesh, optimization, sealed store on disk (`--no-verify`)
   hxt, gmsh   the call that meshes volumes alone: surface in memory already, no validation, result in memory
+  hxt-file, gmsh-file   the whole process: file of the surface read, meshed, file of the mesh written, both binary .msh
   tetgen      the call `tetrahedralize` alone, likewise; it has one thread only
   pytetwild   the call `tetrahedralize` alone; it keeps the surface within a tolerance, not its triangles
   module      tetdb's Python module, arrays in and arrays out, the store's verification included
@@ -21,6 +22,8 @@ import numpy as np
 # Counts are equal when they differ by no more than this share; trials before a mesher is given up.
 EQUAL = 0.05
 TRIALS = 7
+# Gmsh's numbers.
+ALGORITHMS = {"hxt": 10, "gmsh": 1}
 
 
 def peak_bytes():
@@ -54,14 +57,18 @@ def median_edge(points, triangles):
     return float(np.median(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1)))
 
 
-def mesh_gmsh(given, algorithm, threads, scale):
+def start_gmsh(algorithm, threads):
     import gmsh
-    points, triangles = given["points"], given["triangles"]
-    part = connected_parts(len(points), triangles)
     gmsh.initialize(interruptible=False)
     for option, value in (("General.NumThreads", threads), ("Mesh.MaxNumThreads3D", threads), ("General.Verbosity", 2),
                           ("General.Terminal", 0), ("Mesh.Algorithm3D", algorithm)):
         gmsh.option.setNumber(option, value)
+
+
+def add_parts(points, triangles):
+    """A discrete surface for each connected part: HXT takes no surface of several. Their number, and what adds an entity."""
+    import gmsh
+    part = connected_parts(len(points), triangles)
     known = np.zeros(len(points), bool)
 
     def entity(dim, tag, kind, elements):
@@ -71,15 +78,28 @@ def mesh_gmsh(given, algorithm, threads, scale):
         known[nodes] = True
         gmsh.model.mesh.addNodes(dim, tag, nodes + 1, points[nodes].ravel())
         gmsh.model.mesh.addElementsByType(tag, kind, [], (elements + 1).ravel())
-    surfaces = list(range(1, part.max() + 2))
-    for tag in surfaces:
+    for tag in range(1, part.max() + 2):
         entity(2, tag, 2, triangles[part == tag - 1])
+    return part.max() + 1, entity
+
+
+def add_volume(surfaces):
+    import gmsh
     volume = gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(surfaces)])
     gmsh.model.geo.synchronize()
+    return volume
+
+
+def mesh_gmsh(given, algorithm, threads, scale):
+    import gmsh
+    points, triangles = given["points"], given["triangles"]
+    start_gmsh(algorithm, threads)
+    n_surfaces, entity = add_parts(points, triangles)
+    volume = add_volume(range(1, n_surfaces + 1))
     sheets, edges, marks = (given.get(k, np.empty(0)) for k in ("sheets", "edges", "marks"))
     if len(sheets):
-        entity(2, len(surfaces) + 1, 2, sheets)
-        gmsh.model.mesh.embed(2, [len(surfaces) + 1], 3, volume)
+        entity(2, n_surfaces + 1, 2, sheets)
+        gmsh.model.mesh.embed(2, [n_surfaces + 1], 3, volume)
     if len(edges):
         entity(1, 1, 1, edges)
         gmsh.model.mesh.embed(1, [1], 3, volume)
@@ -95,6 +115,28 @@ def mesh_gmsh(given, algorithm, threads, scale):
     position = np.zeros((int(tags.max()) + 1, 3))
     position[tags] = xyz.reshape(-1, 3)
     return position, gmsh.model.mesh.getElementsByType(4)[1].reshape(-1, 4).astype(np.int64), clock
+
+
+def mesh_gmsh_file(given, algorithm, threads, scale, directory):
+    """From file to file. Writing the file of the surface, an entity for each connected part, is not counted."""
+    import gmsh
+    path, out = os.path.join(directory, "surface.msh"), os.path.join(directory, "mesh.msh")
+    points, triangles = given["points"], given["triangles"]
+    start_gmsh(algorithm, threads)
+    add_parts(points, triangles)
+    gmsh.option.setNumber("Mesh.Binary", 1)
+    gmsh.write(path)
+    gmsh.finalize()
+    with Clock() as clock:
+        start_gmsh(algorithm, threads)
+        gmsh.merge(path)
+        add_volume([tag for _, tag in gmsh.model.getEntities(2)])
+        if scale:
+            gmsh.option.setNumber("Mesh.MeshSizeMax", scale * median_edge(points, triangles))
+        gmsh.option.setNumber("Mesh.Binary", 1)
+        gmsh.model.mesh.generate(3)
+        gmsh.write(out)
+    return len(gmsh.model.mesh.getElementsByType(4)[0]), clock
 
 
 def mesh_tetgen(given, scale):
@@ -134,8 +176,12 @@ def child(mesher, arrays, out, threads, scale):
     with np.load(arrays) as file:
         given = dict(file)
     threads, scale = int(threads), float(scale)
-    if mesher in ("hxt", "gmsh"):
-        points, tets, clock = mesh_gmsh(given, 10 if mesher == "hxt" else 1, threads, scale)
+    if mesher.endswith("-file"):
+        n_tets, clock = mesh_gmsh_file(given, ALGORITHMS[mesher.removesuffix("-file")], threads, scale, os.path.dirname(arrays))
+        print("\n" + json.dumps({"tets": n_tets, "cpu": clock.cpu, "wall": clock.wall, "peak": clock.peak}))
+        return
+    if mesher in ALGORITHMS:
+        points, tets, clock = mesh_gmsh(given, ALGORITHMS[mesher], threads, scale)
     elif mesher == "tetgen":
         points, tets, clock = mesh_tetgen(given, scale)
     else:

@@ -65,7 +65,7 @@ def speed(args):
     """With --equal the others get a greatest length with which they generate as many tetrahedra as tetdb, within 5 % (TetGen a greatest
     volume); found by trial, which is not timed. Without it each uses its defaults, and rates flatter whoever generates more tetrahedra.
     Runs take turns (a b c a b c), so that a slower machine slows all; medians are printed. Memory is the peak of the process less what it
-    held before meshing. `none` and `delaunay` are tetdb with that --optimize."""
+    held before meshing. `none` and `delaunay` are tetdb with that --optimize; `hxt-file` and `gmsh-file` are whole commands, file to file."""
     if args.equal and args.meshers[0] != "tetdb":
         sys.exit("--equal needs tetdb as the first mesher")
     rows = []
@@ -86,7 +86,7 @@ def speed_of(surface, args, directory):
     for turn in range(args.runs):
         for mesher, threads in kinds:
             keep = None
-            if turn == 0 and threads == args.threads[0] and not args.no_measure:
+            if turn == 0 and threads == args.threads[0] and not args.no_measure and not mesher.endswith("-file"):
                 keep = os.path.join(directory, "mesh.meshb" if mesher in OURS else "mesh.npz")
             try:
                 if mesher in OURS:
@@ -95,7 +95,8 @@ def speed_of(surface, args, directory):
                 else:
                     if args.equal and mesher not in scales:
                         wanted = runs["tetdb", args.threads[0]][0]["tets"]
-                        scales[mesher] = meshers.scale_for(mesher, arrays, wanted, args.timeout)
+                        alike = scales.get(mesher.removesuffix("-file"))
+                        scales[mesher] = alike or meshers.scale_for(mesher, arrays, wanted, args.timeout)
                     run = meshers.run_other(mesher, arrays, keep, threads, scales.get(mesher, 0.0), args.timeout)
                 runs[mesher, threads].append(run)
             except meshers.FAILURES as failure:
