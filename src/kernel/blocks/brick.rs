@@ -1,10 +1,7 @@
 //! Bricks: the unit in which blocks hand parts of the mesh to each other.
 
-use tetdb_schema::page::u32_le;
-
 use super::flat::{Attribute, Vertex};
 use crate::mesh::{FaceRef, Tet};
-use tetdb_base::geom::Point;
 use tetdb_base::storage::{Shelf, Shelved};
 
 /// Bits of a vertex's or a tetrahedron's slot in its brick. The bits above, in a reference, are a place in the
@@ -45,47 +42,43 @@ impl Shelved for Brick {
             false => self.attributes.len(),
         };
         let counts = [self.near.len(), self.tets.len(), self.vertices.len(), n_attributes];
-        let mut put = |word: u32| out.extend_from_slice(&word.to_le_bytes());
-        counts.into_iter().for_each(|n| put(n as u32));
-        put(self.unexamined);
-        self.near.iter().for_each(|&n| put(n));
+        let [near, tets, vertices, attributes] = counts.map(|n| n as u32);
+        // A length and an order in which all records lie aligned in an aligned buffer.
+        let head: Head = [near, tets, vertices, attributes, self.unexamined, 0];
+        out.extend_from_slice(bytemuck::cast_slice(&head));
+        out.extend_from_slice(bytemuck::cast_slice(&self.vertices));
+        out.extend_from_slice(bytemuck::cast_slice(&self.tets));
+        out.extend_from_slice(bytemuck::cast_slice(&self.near));
         for &(region, flags) in &self.attributes[..n_attributes] {
-            put(region);
-            put(flags);
-        }
-        for tet in &self.tets {
-            tet.to_slot().into_iter().for_each(|word| put(word.to_native()));
-        }
-        for vertex in &self.vertices {
-            for x in vertex.point.to_array() {
-                put(x.to_bits() as u32);
-                put((x.to_bits() >> 32) as u32);
-            }
-            put(vertex.words()[0]);
-            put(vertex.words()[1]);
+            out.extend_from_slice(bytemuck::cast_slice(&[region, flags]));
         }
     }
 
     fn read(bytes: &[u8]) -> Self {
-        let mut words = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let mut next = || words.next().expect("all of it was written");
-        let [n_near, n_tets, n_vertices, n_attributes, unexamined] = [(); 5].map(|()| next());
-        let near = (0..n_near).map(|_| next()).collect();
-        let mut attributes: Vec<Attribute> = (0..n_attributes).map(|_| (next(), next())).collect();
+        let mut rest = bytes;
+        let head = records::<Head>(&mut rest, 1)[0];
+        let [n_near, n_tets, n_vertices, n_attributes, unexamined, _] = head;
+        let vertices = records(&mut rest, n_vertices);
+        let tets = records(&mut rest, n_tets);
+        let near = records(&mut rest, n_near);
+        let pairs: Vec<[u32; 2]> = records(&mut rest, n_attributes);
+        let mut attributes: Vec<Attribute> = pairs.into_iter().map(|[r, f]| (r, f)).collect();
         if let [common] = attributes[..] {
             attributes.resize(n_tets as usize, common);
         }
-        let tets = (0..n_tets)
-            .map(|_| Tet::from_slot(&[(); 8].map(|()| u32_le::from_native(next()))))
-            .collect();
-        let vertices = (0..n_vertices)
-            .map(|_| {
-                let mut coordinate = || f64::from_bits(u64::from(next()) | u64::from(next()) << 32);
-                let point = Point::new(coordinate(), coordinate(), coordinate());
-                Vertex::of_words(point, [next(), next()])
-            })
-            .collect();
         Self { near, tets, attributes, vertices, unexamined }
+    }
+}
+
+/// Counts of references, tetrahedra, vertices and attributes; tetrahedra not examined; nothing.
+type Head = [u32; 6];
+
+/// Takes `n` records from the front of what was written.
+fn records<R: bytemuck::Pod>(rest: &mut &[u8], n: u32) -> Vec<R> {
+    let bytes = rest.split_off(..n as usize * size_of::<R>()).expect("all of it was written");
+    match bytemuck::try_cast_slice(bytes) {
+        Ok(records) => records.to_vec(),
+        Err(_) => bytemuck::pod_collect_to_vec(bytes),
     }
 }
 

@@ -29,16 +29,6 @@ impl Vertex {
         self.h.abs()
     }
 
-    /// Length with the sign that tells whether it is fixed, and note, as words.
-    pub fn words(&self) -> [u32; 2] {
-        [self.h.to_bits(), self.note]
-    }
-
-    /// A vertex from [`Vertex::words`].
-    pub fn of_words(point: Point, [h, note]: [u32; 2]) -> Self {
-        Self { point, h: f32::from_bits(h), note }
-    }
-
     /// Moves a vertex that is not fixed, and changes the length wanted there. A vertex at infinity is gone.
     pub fn set(&mut self, point: Point, h: f32) {
         (self.point, self.h) = (point, h);

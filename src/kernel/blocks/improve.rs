@@ -157,7 +157,7 @@ impl ArrayPages {
             (std::mem::take(&mut mesh.tets), std::mem::take(&mut mesh.vertices));
         let n_live = tets.iter().filter(|tet| tet.is_live()).count() as u32;
         let n_vertices = vertices.len() as u32;
-        let unused = Vertex::of_words(Point::INFINITY, [0, NONE]);
+        let unused = Vertex::new(Point::INFINITY, 0.0, false, NONE);
         tets.resize(tets.len().next_multiple_of(SLOTS), EMPTY);
         vertices.resize(vertices.len().next_multiple_of(SLOTS), unused);
         let behind = |n: usize, n_live: u32| IdCounts { fresh: n as u32, free_head: NONE, n_live };
@@ -227,7 +227,7 @@ impl Pages for ArrayPages {
         match K {
             kind::TETS => self.tets.resize(self.tets.len() + SLOTS, EMPTY),
             kind::VERTICES => {
-                let unused = Vertex::of_words(Point::INFINITY, [0, NONE]);
+                let unused = Vertex::new(Point::INFINITY, 0.0, false, NONE);
                 self.vertices.resize(self.vertices.len() + SLOTS, unused);
             }
             _ => return self.rest.append_page::<K>(),

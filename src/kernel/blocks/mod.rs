@@ -29,7 +29,7 @@ mod smooth;
 mod spawn;
 mod tasks;
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use crate::mesh::Mesh;
@@ -105,7 +105,10 @@ fn saturate_at<P: Pages>(
     mesh.clear_tets();
     bricks.limit(memory.bricks);
     mesh.pages_mut().use_at_most(memory.pages);
-    let graph = Graph::new(&partition, if mode == Mode::None { 1 } else { 2 });
+    let mut graph = Graph::new(&partition, if mode == Mode::None { 1 } else { 2 });
+    if memory.bricks < usize::MAX {
+        graph.go_along_the_tree();
+    }
     let visits = Visits {
         partition: &partition,
         field,
@@ -117,6 +120,7 @@ fn saturate_at<P: Pages>(
         }),
         inserted: AtomicU64::new(scaffold),
         left: partition.blocks.iter().map(|_| AtomicBool::new(false)).collect(),
+        unexamined: (0..n_bricks).map(|_| AtomicU32::new(0)).collect(),
     };
     let mut told = || progress(visits.inserted.load(Ordering::Relaxed));
     let visit = |visitor: &mut Visitor, task| {
@@ -173,6 +177,8 @@ struct Visits<'a, 'b> {
     inserted: AtomicU64,
     /// Blocks whose second visit waits until all is divided.
     left: Vec<AtomicBool>,
+    /// [`brick::Brick::unexamined`] of each brick since its last visit: bricks need not be in memory to be asked.
+    unexamined: Vec<AtomicU32>,
 }
 
 /// Scratch of a thread.
@@ -236,6 +242,9 @@ impl Visits<'_, '_> {
         work(visitor, &is_own, own);
         debug_assert!(visitor.region.mesh.is_sound());
         let made = visitor.region.check_in(own);
+        for (&number, brick) in numbers.iter().zip(&made) {
+            self.unexamined[number as usize].store(brick.unexamined, Ordering::Relaxed);
+        }
         self.bricks.put_all(numbers.iter().copied().zip(made));
     }
 
@@ -248,7 +257,7 @@ impl Visits<'_, '_> {
         for rings in RINGS {
             for block in &self.partition.blocks {
                 let left: Vec<u32> =
-                    block.bricks.clone().filter(|&b| self.bricks.get(b).unexamined > 0).collect();
+                    block.bricks.clone().filter(|&b| self.unexamined_in(b) > 0).collect();
                 if left.is_empty() {
                     continue;
                 }
@@ -288,7 +297,11 @@ impl Visits<'_, '_> {
     }
 
     fn n_unexamined(&self, block: &partition::Block) -> u64 {
-        block.bricks.clone().map(|b| u64::from(self.bricks.get(b).unexamined)).sum()
+        block.bricks.clone().map(|b| u64::from(self.unexamined_in(b))).sum()
+    }
+
+    fn unexamined_in(&self, brick: u32) -> u32 {
+        self.unexamined[brick as usize].load(Ordering::Relaxed)
     }
 
     fn divide(&self, visitor: &mut Visitor, is_due: &[bool], own: u32) {
