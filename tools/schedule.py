@@ -1,15 +1,21 @@
 #!/usr/bin/env python3
-"""Wall time of a mesh against workers, forecast from the journal of a store.
+"""Wall time of a mesh against threads or workers, forecast from the journal of a store.
 
-    tetdb info STORE --json | tools/schedule.py [--front SECONDS] [--workers 1,2,4,...] [--overhead SECONDS]
+    tetdb info STORE --json | tools/schedule.py [--front SECONDS] [--workers 1,2,4,...] [--overhead SECONDS] [--one]
 
-The journal has the seconds of the coarse mesh, of every cut and of every sub-domain. They are put on so many
-workers as the program does it: a cut begins when the one above it is done, sub-domains begin when all cuts are,
-whoever is free takes the next, and the last of the tree are the last to be taken. What is before the coarse mesh
-(reading, validation, sizes) is in no journal: --front says how long that took. It and the coarse mesh are serial.
+The journal has the seconds of each step, and how many of them threads can share: those of one thread alone, those
+of work without order, and those of tasks that wait for each other with their longest chain. A step with n threads
+takes what one does alone, the n-th part of the rest, and the chain, which is an upper bound for any such tasks.
+What one does beside the checks (the head start of a run with more than one thread) stays beside them.
 
-Seconds count as they were measured: a store meshed by several threads at once has those of tasks that shared
-memory and caches. --overhead is added to every task, for a scheduler that starts a process for each.
+Steps are put on so many workers as the program does it: a cut begins when the one above it is done, sub-domains
+begin when all cuts are, whoever is free takes the next, and the last of the tree are the last to be taken. Workers
+that are left over are threads of those at work. With --one each task has one thread, as tasks of a cluster do.
+What is before the checks (reading) is in no journal: --front says how long that took.
+
+Seconds count as they were measured. A run with one thread has no work shared in some places where two would share
+it, so a run with two threads on an idle machine forecasts best. --overhead is added to every task, for a scheduler
+that starts a process for each.
 """
 
 import argparse
@@ -30,18 +36,34 @@ def tree(n):
     return above
 
 
+class Step:
+    """Seconds of a step, as threads can share them."""
+
+    def __init__(self, seconds, measures):
+        self.serial, self.shared, tasks, self.chain = (measures.get(k, 0.0) for k in ("serial_s", "parallel_s", "tasks_s", "chain_s"))
+        self.shared += tasks - self.chain
+        if "serial_s" not in measures:
+            self.serial = seconds
+
+    def with_threads(self, n):
+        return self.serial + self.chain + self.shared / max(1.0, n)
+
+
 def tasks_of(journal):
-    """Seconds of the coarse mesh, of cuts by number, of sub-domains by rank."""
-    coarse, cuts, leaves = 0.0, {}, {}
+    """The checks, the insertion beside them, the coarse mesh, cuts by number, sub-domains by rank."""
+    checks, beside, coarse, cuts, leaves = Step(0.0, {}), 0.0, Step(0.0, {}), {}, {}
     for row in journal:
         measures = {m["name"]: m["value"] for m in row["measures"]}
-        if row["step"] == "coarse mesh":
-            coarse = row["seconds"]
+        step = Step(row["seconds"], measures)
+        if row["step"] == "check, sizes":
+            checks = step
+        elif row["step"] == "coarse mesh":
+            coarse, beside = step, measures.get("head_start_s", 0.0)
         elif row["step"] == "bisect":
-            cuts[int(measures["cut"])] = row["seconds"]
+            cuts[int(measures["cut"])] = step
         elif row["step"].startswith("saturate"):
-            leaves[row["subdomain"]] = row["seconds"]
-    return coarse, cuts, leaves
+            leaves[row["subdomain"]] = step
+    return checks, beside, coarse, cuts, leaves
 
 
 def cuts_wall(cuts, above, workers):
@@ -80,31 +102,45 @@ def leaves_wall(leaves, workers):
     return max(free)
 
 
+def begin_wall(checks, beside, coarse, n):
+    """Checks and the coarse mesh, with the insertion of vertices on a thread beside the checks if there are two."""
+    begin = checks.with_threads(n) + beside if n < 2 else max(checks.with_threads(n - 1), beside)
+    return begin + coarse.with_threads(n)
+
+
+def wall(tasks, above, n, args):
+    """Seconds of front, cuts and sub-domains with n workers."""
+    *begin, cuts, leaves = tasks
+    share = (lambda at_once: 1) if args.one else (lambda at_once: n / at_once)
+    cut_seconds = {cut: step.with_threads(share(min(n, 2 ** depth(above, cut)))) + args.overhead for cut, step in cuts.items()}
+    leaf_seconds = {rank: step.with_threads(share(min(n, len(leaves)))) + args.overhead for rank, step in leaves.items()}
+    front = args.front + begin_wall(*begin, 1 if args.one else n)
+    return front, cuts_wall(cut_seconds, above, n), leaves_wall(leaf_seconds, n)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("info", nargs="?", help="what `tetdb info STORE --json` wrote [default: standard input]")
     parser.add_argument("--front", type=float, default=0.0, metavar="SECONDS")
     parser.add_argument("--overhead", type=float, default=0.0, metavar="SECONDS")
+    parser.add_argument("--one", action="store_true", help="one thread for each task")
     parser.add_argument("--workers", default="1,2,4,8,16,32,64,128,256,512,1024,2048,4096")
     args = parser.parse_args()
     info = json.load(open(args.info) if args.info else sys.stdin)
-    coarse, cuts, leaves = tasks_of(info["journal"])
+    tasks = tasks_of(info["journal"])
+    checks, beside, coarse, cuts, leaves = tasks
     above = tree(len(leaves))
     if not leaves or set(above) != set(cuts):
         sys.exit("the journal has not every cut and every sub-domain: is the mesh finished, and its own?")
-    cuts = {cut: s + args.overhead for cut, s in cuts.items()}
-    leaves = {rank: s + args.overhead for rank, s in leaves.items()}
-    serial = args.front + coarse
-    one = serial + sum(cuts.values()) + sum(leaves.values())
-    print(f"{len(leaves)} sub-domains; serial {serial:.1f} s, cuts {sum(cuts.values()):.1f} s, sub-domains {sum(leaves.values()):.1f} s")
-    longest = cuts_wall(cuts, above, len(cuts) or 1)
-    print(f"with any number of workers: serial {serial:.1f} + tree {longest:.1f} + longest sub-domain {max(leaves.values()):.1f} s")
-    print(f"{'workers':>8} {'wall s':>9} {'cuts s':>9} {'sub-d. s':>9} {'faster':>7}")
+    one = sum(wall(tasks, above, 1, args))
+    steps = [checks, coarse, *cuts.values(), *leaves.values()]
+    print(f"{len(leaves)} sub-domains; {one:.1f} s on one thread, {args.front + sum(s.serial for s in steps):.1f} s of it for one alone, "
+          f"longest chains {sum(s.chain for s in steps):.1f} s, beside the checks {beside:.1f} s")
+    print(f"{'workers':>8} {'wall s':>9} {'front s':>9} {'cuts s':>9} {'sub-d. s':>9} {'faster':>7}")
     for workers in map(int, args.workers.split(",")):
-        parts = cuts_wall(cuts, above, workers), leaves_wall(leaves, workers)
-        wall = serial + sum(parts)
-        bar = "#" * round(40 * wall / one)
-        print(f"{workers:>8} {wall:>9.1f} {parts[0]:>9.1f} {parts[1]:>9.1f} {one / wall:>6.2f}x {bar}")
+        parts = wall(tasks, above, workers, args)
+        bar = "#" * round(40 * sum(parts) / one)
+        print(f"{workers:>8} {sum(parts):>9.1f} {parts[0]:>9.1f} {parts[1]:>9.1f} {parts[2]:>9.1f} {one / sum(parts):>6.2f}x {bar}")
 
 
 if __name__ == "__main__":

@@ -37,6 +37,7 @@ mod sort;
 mod sort_record;
 mod spill;
 mod spill_vec;
+mod step_clock;
 
 pub use budget::{Budget, Lease};
 pub use cancel::{OrRaise, attempt, check_cancelled, raise};
@@ -64,3 +65,4 @@ pub use sort::{Sorted, Sorter};
 pub use sort_record::sort_record;
 pub use sort_record::{KeyedId, Payload, SortBytes, SortField, SortRecord, total_order};
 pub use spill_vec::{FrozenSpillVec, ScratchSpace, SpillVec, SpillVecBuilder};
+pub use step_clock::{SharedSeconds, StepClock, shared_tasks};

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 
 use super::cancel_token::CancelToken;
+use super::step_clock::shared;
 
 /// Small items that are worth handing to another thread.
 const ITEMS_MIN: usize = 1024;
@@ -108,6 +109,11 @@ impl RunContext {
         panic.take()
     }
 
+    /// Returns whether this is a thread of the run's pool.
+    pub(super) fn is_in_pool() -> bool {
+        CURRENT.with_borrow(|current| current.as_ref().is_some_and(|c| c.pool.is_none()))
+    }
+
     /// Returns whether the run of this thread is cancelled.
     #[inline]
     pub fn is_current_cancelled() -> bool {
@@ -156,8 +162,8 @@ impl Drop for Pool {
 pub fn parallel<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let pool = RunContext::current().and_then(|context| context.pool);
     match pool.as_ref().and_then(|pool| pool.threads()) {
-        Some(threads) => threads.install(work),
-        None => work(),
+        Some(threads) => shared(|| threads.install(work)),
+        None => shared(work),
     }
 }
 
@@ -167,7 +173,7 @@ pub fn join<A: Send, B: Send>(
     b: impl FnOnce() -> B + Send,
 ) -> (A, B) {
     match spare_threads() {
-        1 => (a(), b()),
+        1 => shared(|| (a(), b())),
         _ => parallel(|| rayon::join(a, b)),
     }
 }
@@ -175,7 +181,7 @@ pub fn join<A: Send, B: Send>(
 /// Does `work` on each item, side by side where a thread is to spare.
 pub fn for_each_mut<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Sync + Send) {
     match spare_threads() {
-        1 => items.iter_mut().for_each(work),
+        1 => shared(|| items.iter_mut().for_each(work)),
         _ => parallel(|| items.par_iter_mut().for_each(work)),
     }
 }
@@ -187,10 +193,10 @@ pub fn map_into<T: Sync, U: Send>(
     found: impl Fn(&T) -> U + Sync + Send,
 ) {
     match spare_threads() {
-        1 => {
+        1 => shared(|| {
             all.clear();
             all.extend(items.iter().map(found));
-        }
+        }),
         _ => parallel(|| {
             let items = items.par_iter().with_min_len(ITEMS_MIN);
             items.map(found).collect_into_vec(all);
@@ -201,7 +207,7 @@ pub fn map_into<T: Sync, U: Send>(
 /// The results of `found` for items that take long each, in order; in parallel if a thread is free.
 pub fn map_long<T: Sync, U: Send>(items: &[T], found: impl Fn(&T) -> U + Sync + Send) -> Vec<U> {
     if items.len() < 2 || spare_threads() == 1 {
-        return items.iter().map(found).collect();
+        return shared(|| items.iter().map(found).collect());
     }
     parallel(|| items.par_iter().map(found).collect())
 }

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 use tetdb_schema::code::Code;
 
 use super::field_arrays::FieldArrays;
@@ -17,7 +16,7 @@ use super::{
 };
 use crate::pipeline::{self, MeshOptions, Options, PipelineError, Prepared, RECIPE};
 use tetdb_base::geom::{Point, count};
-use tetdb_base::storage::{Budget, CancelToken, ScratchSpace, attempt, n_threads};
+use tetdb_base::storage::{Budget, CancelToken, ScratchSpace, StepClock, attempt, n_threads};
 use tetdb_base::surface::{self, Seed, SeedKind};
 use tetdb_schema::catalog::StoreState;
 use tetdb_store::audit::Level;
@@ -450,7 +449,7 @@ impl Mesher {
         cap: u64,
         settings: &Settings,
     ) -> Result<(Prepared, Option<pipeline::HeadStart>), Error> {
-        let (clock, surface) = (Instant::now(), &self.surface.inner);
+        let (clock, surface) = (StepClock::start(), &self.surface.inner);
         let watch = settings.watcher();
         pipeline::head_start(surface, &self.options, cap, &watch, |taken| {
             let left = cap - taken;
@@ -464,17 +463,18 @@ impl Mesher {
                     n => format!(", {n} of them in sheets,"),
                 },
                 surface.n_input_vertices(),
-                clock.elapsed().as_secs_f64()
+                clock.seconds()
             ));
             settings.note(format!("memory: {}", settings.cap_in_words()));
             let field = self.sizes.field.as_deref();
-            let prepared = predict_with(surface, &self.options, field, left, path)?;
+            let mut prepared = predict_with(surface, &self.options, field, left, path)?;
             for note in &prepared.notes {
                 settings.note(format!("note: {note}"));
             }
             if self.preflight {
                 preflight(&prepared.estimate, cap, path, settings)?;
             }
+            prepared.journal = Some(pipeline::prepared_row(&clock));
             Ok::<_, Error>(prepared)
         })
     }

@@ -46,6 +46,7 @@ pub use remesh::{
     FieldChange, Forecast, NewSizes, ResaturateSummary, Resaturated, Resaturation, Values, changed,
     forecast, forget, previous, recorded_request, resaturate, restore, shells,
 };
+pub use seal::totals::prepared_row;
 pub use tasks::serve;
 pub use tasks::{
     Gathered, Performed, Planned, Stage, StageKind, TASKS_MAX, TaskSettings, TaskState, end_plan,

@@ -6,9 +6,10 @@
 
 use std::collections::BinaryHeap;
 use std::sync::{Condvar, Mutex, PoisonError};
+use std::time::Instant;
 
 use super::partition::KdPartition;
-use tetdb_base::storage::{check_cancelled, in_place_scope};
+use tetdb_base::storage::{check_cancelled, in_place_scope, shared_tasks};
 
 /// The graph of all visits; task `phase * n + block` for `n` blocks.
 pub(super) struct Graph {
@@ -17,7 +18,7 @@ pub(super) struct Graph {
     followers: Vec<Vec<u32>>,
     /// Tasks that each task waits for.
     n_before: Vec<u32>,
-    /// Longest chain that begins with the task, in units of load.
+    /// What is greater goes first: the longest chain that begins with the task, in units of load.
     urgency: Vec<u64>,
 }
 
@@ -67,6 +68,15 @@ impl Graph {
         }
     }
 
+    /// From now on tasks go along the tree, as far as their order allows: those near each other need the same bricks. This suits bricks
+    /// that do not all stay in memory; chains are longer, and the mesh is the same.
+    pub fn go_along_the_tree(&mut self) {
+        let n = self.n_blocks;
+        for (task, urgency) in self.urgency.iter_mut().enumerate() {
+            *urgency = (n - task % n) as u64;
+        }
+    }
+
     pub fn n_tasks(&self) -> usize {
         self.followers.len()
     }
@@ -85,13 +95,25 @@ impl Graph {
         work: &(dyn Fn(&mut S, usize) + Sync),
         told: &mut dyn FnMut(),
     ) {
-        let n_threads = threads.min(self.n_blocks);
+        shared_tasks(|| self.run_all(threads.min(self.n_blocks), scratch, work, told));
+    }
+
+    /// Returns the seconds of all tasks and of the longest chain.
+    fn run_all<S>(
+        &self,
+        n_threads: usize,
+        scratch: &(dyn Fn() -> S + Sync),
+        work: &(dyn Fn(&mut S, usize) + Sync),
+        told: &mut dyn FnMut(),
+    ) -> [f64; 2] {
         let ready = (0..self.n_tasks()).filter(|&t| self.n_before[t] == 0);
         let state = TaskState {
             before: self.n_before.clone(),
             ready: ready.map(|t| self.rank(t)).collect(),
             done: 0,
             is_over: false,
+            chains: vec![0.0; self.n_tasks()],
+            seconds: [0.0; 2],
         };
         let queue = Queue { graph: self, state: Mutex::new(state), changed: Condvar::new() };
         let thread = |told: &mut dyn FnMut()| {
@@ -99,21 +121,23 @@ impl Graph {
             let mut own = scratch();
             while let Some(task) = queue.next() {
                 check_cancelled();
+                let begun = Instant::now();
                 work(&mut own, task);
-                queue.finish(task);
+                queue.finish(task, begun.elapsed().as_secs_f64());
                 told();
             }
         };
         if n_threads <= 1 {
             thread(told);
-            return;
+        } else {
+            in_place_scope(|scope| {
+                for _ in 1..n_threads {
+                    scope.spawn(|_| thread(&mut || ()));
+                }
+                thread(told);
+            });
         }
-        in_place_scope(|scope| {
-            for _ in 1..n_threads {
-                scope.spawn(|_| thread(&mut || ()));
-            }
-            thread(told);
-        });
+        queue.state.into_inner().unwrap_or_else(PoisonError::into_inner).seconds
     }
 
     fn rank(&self, task: usize) -> (u64, std::cmp::Reverse<usize>) {
@@ -128,6 +152,10 @@ struct TaskState {
     done: usize,
     /// A thread unwinds.
     is_over: bool,
+    /// Seconds of the longest chain of tasks that ends where the task begins.
+    chains: Vec<f64>,
+    /// Of all tasks, and of the longest chain.
+    seconds: [f64; 2],
 }
 
 struct Queue<'a> {
@@ -151,10 +179,15 @@ impl Queue<'_> {
         }
     }
 
-    fn finish(&self, task: usize) {
+    fn finish(&self, task: usize, seconds: f64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         state.done += 1;
+        let end = state.chains[task] + seconds;
+        let [sum, longest] = state.seconds;
+        state.seconds = [sum + seconds, longest.max(end)];
         for &follower in &self.graph.followers[task] {
+            let chain = &mut state.chains[follower as usize];
+            *chain = chain.max(end);
             let before = &mut state.before[follower as usize];
             *before -= 1;
             if *before == 0 {

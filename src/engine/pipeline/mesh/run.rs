@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::coarse::{CoarseReport, inserted, recovered};
 use super::commit::{close, commit_subdomain, subdomain_order};
@@ -13,7 +12,7 @@ use crate::pipeline::plan::leases::Leases;
 use crate::pipeline::plan::subdomains::n_subdomains;
 use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::totals::journal;
+use crate::pipeline::seal::totals::{by_threads, journal};
 use crate::pipeline::tasks::{ask, begin, wrong_receipt};
 use crate::pipeline::tree::{self, DONE};
 use crate::pipeline::work::common::Common;
@@ -21,14 +20,14 @@ use crate::pipeline::work::traffic::pages_of;
 use crate::pipeline::work::{FineReport, Worker, WorkerPool, Workplace};
 use crate::pipeline::workers::{WorkerFn, map_bounded};
 use tetdb_base::geom::{Aabb, HilbertFrame};
-use tetdb_base::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
+use tetdb_base::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, StepClock, attempt};
 use tetdb_base::surface::Surface;
 use tetdb_kernel::bisect::{CutReport, load_of};
 use tetdb_kernel::boundary::RegionSummary;
 use tetdb_kernel::mesh::{Mesh, Workspace, renumber};
 use tetdb_kernel::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
 use tetdb_schema::blob::{Blob, BlobContent};
-use tetdb_schema::catalog::{RegionRow, StoreState, WiresRow};
+use tetdb_schema::catalog::{JournalRow, RegionRow, StoreState, WiresRow};
 use tetdb_schema::tree::{RankRange, SubtreeMesh};
 use tetdb_schema::work::{Receipt, SubdomainOrder, SubdomainReceipt, Traffic, WorkOrder};
 use tetdb_store::store::{Catalog, INPUT_TRIANGLES};
@@ -101,9 +100,9 @@ pub fn mesh_prepared(
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
-    let new = New { sizes: prepared.sizes, estimate: prepared.estimate, begun };
-    let field = &prepared.field;
-    go_on(catalog, surface, options, field, Some(new), budget, watch)
+    let Prepared { sizes, estimate, journal, .. } = prepared;
+    let new = New { sizes, estimate, begun, journal };
+    go_on(catalog, surface, options, &prepared.field, Some(new), budget, watch)
 }
 
 /// Input of the first step: sizes, estimate and head start of a mesh that is not begun.
@@ -111,6 +110,7 @@ struct New {
     sizes: SizeSummary,
     estimate: Estimate,
     begun: Option<HeadStart>,
+    journal: Option<JournalRow>,
 }
 
 fn go_on(
@@ -173,7 +173,8 @@ impl<'a> Run<'a> {
         let is_begun = self.catalog.state()? >= StoreState::Coarse;
         if let Some(new) = new.filter(|_| !is_begun) {
             let begun = new.begun.filter(|begun| begun.bytes() <= self.plan.frames);
-            let (mesh, report) = self.coarse_step(surface, &new.estimate, begun)?;
+            let (mesh, report) =
+                self.coarse_step(surface, (&new.estimate, new.journal.as_ref()), begun)?;
             (open, coarse, sizes) = (Some(mesh), Some(report), Some(new.sizes));
         } else {
             drop(surface);
@@ -226,10 +227,10 @@ impl<'a> Run<'a> {
     fn coarse_step(
         &mut self,
         surface: Cow<Surface>,
-        estimate: &Estimate,
+        (estimate, prepared): (&Estimate, Option<&JournalRow>),
         begun: Option<HeadStart>,
     ) -> Result<(Mesh, CoarseReport), PipelineError> {
-        let clock = Instant::now();
+        let clock = StepClock::start();
         let scratch = self.catalog.scratch_dir()?;
         let backing = Backing {
             subdomain: 0,
@@ -292,10 +293,13 @@ impl<'a> Run<'a> {
             step.set_blob(Blob::SubdomainCount, &n.to_le_bytes());
             step.set_blob(Blob::Subtree(0), &part.to_bytes());
             step.set_state(StoreState::Coarse);
+            if let Some(row) = prepared {
+                step.append_journal(row);
+            }
             step.append_journal(&journal(
                 StoreState::Coarse,
                 "coarse mesh",
-                clock,
+                clock.begun(),
                 &[
                     ("missing_segments", f64::from(report.recovery.missing_segments)),
                     ("missing_facets", f64::from(report.recovery.missing_facets)),
@@ -305,7 +309,10 @@ impl<'a> Run<'a> {
                     ("pages_read", pages.pages_read as f64),
                     ("pages_written", pages.pages_written as f64),
                     ("frames_used", frames_used as f64),
-                ],
+                ]
+                .into_iter()
+                .chain(by_threads(&clock))
+                .collect::<Vec<_>>(),
             ));
             Ok(())
         })?;

@@ -19,6 +19,7 @@ use tetdb_kernel::sizing::{
     Background, Domain, ExtraSizes, NearLabel, Region, SizeConstraint, SizeField, SizeSummary,
     TetCounts,
 };
+use tetdb_schema::catalog::JournalRow;
 use tetdb_store::sealed::Form;
 
 /// Bytes held per triangle once volumes are identified: the volume on each of its two sides.
@@ -128,6 +129,8 @@ pub struct Prepared {
     pub estimate: Estimate,
     /// Notes on the regions for the user.
     pub notes: Vec<String>,
+    /// What preparing it took, for the journal.
+    pub journal: Option<JournalRow>,
 }
 
 /// Builds the size field and predicts the counts of the mesh. `background` has the contents of the options' `size_field`.
@@ -204,7 +207,8 @@ fn prepare_in(
         sizes.source = format!("a size field, {}", sizes.source);
     }
     let estimate = Estimate::of(&domain, options, &field)?;
-    Ok(Prepared { field, sizes, estimate, notes: notes(&chosen, options, volumes.n_volumes - 1) })
+    let notes = notes(&chosen, options, volumes.n_volumes - 1);
+    Ok(Prepared { field, sizes, estimate, notes, journal: None })
 }
 
 /// Notes on seeds: the number of unnamed regions if some have names, and how many of the `n` volumes stay empty under a rule by

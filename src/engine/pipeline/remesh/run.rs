@@ -422,7 +422,7 @@ impl<'a> RemeshRun<'a> {
                     ("pages_read", subdomain.pages.pages_read as f64),
                     ("pages_written", subdomain.pages.pages_written as f64),
                 ];
-                let since = if finished.len() == 1 { clock } else { subdomain.clock };
+                let since = if finished.len() == 1 { clock } else { subdomain.clock.begun() };
                 let mut journal = journal(StoreState::Sealed, step_name, since, &measures);
                 journal.subdomain = Some(rank);
                 step.append_journal(&journal);

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::tree::read_blob;
+use tetdb_base::storage::StepClock;
 use tetdb_schema::blob::Blob;
 use tetdb_schema::catalog::{InterfaceRow, JournalRow, Measure, RegionRow, StoreState};
 use tetdb_schema::totals::SubdomainTotals;
@@ -61,6 +62,22 @@ pub fn sum_totals(
         }
     }
     Ok(Totals { regions, interfaces })
+}
+
+/// Measures of a step by how many threads can share its seconds, asked on the thread of the step.
+pub fn by_threads(clock: &StepClock) -> [(&'static str, f64); 4] {
+    let shared = clock.shared();
+    [
+        ("serial_s", clock.seconds() - shared.clock),
+        ("parallel_s", shared.parallel),
+        ("tasks_s", shared.tasks),
+        ("chain_s", shared.chain),
+    ]
+}
+
+/// Row of the journal for what comes before a store is begun.
+pub fn prepared_row(clock: &StepClock) -> JournalRow {
+    journal(StoreState::Imported, "check, sizes", clock.begun(), &by_threads(clock))
 }
 
 /// Row of the journal for a step that began at `clock`.

@@ -1,7 +1,5 @@
 //! One bisection: reads the file of a subtree and writes the files of its two children.
 
-use std::time::Instant;
-
 use super::common::Common;
 use super::cut_journal::CutJournal;
 use super::soundness::panic_is_damage_of;
@@ -11,7 +9,7 @@ use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::{Event, Watcher};
 use crate::pipeline::tree::{DONE, open_subtree};
-use tetdb_base::storage::{Backing, DiskPath, Pager, PagerStats, attempt};
+use tetdb_base::storage::{Backing, DiskPath, Pager, PagerStats, StepClock, attempt};
 use tetdb_kernel::bisect::{self, CutPlan, CutReport, OpenCut, Zone};
 use tetdb_kernel::mesh::{Mesh, Workspace};
 use tetdb_kernel::optimize::Settings;
@@ -53,7 +51,7 @@ impl CutJob<'_> {
     }
 
     fn divide(&self, watch: &Watcher) -> Result<(CutReceipt, CutReport), PipelineError> {
-        let clock = Instant::now();
+        let clock = StepClock::start();
         let (parent, common) = (self.order.parent, self.common);
         let ranks = parent.ranks;
         let space = Workspace { dir: &self.scratch, memory: self.share.buffers / 2 };
@@ -115,7 +113,7 @@ impl CutJob<'_> {
             inherited: high.inherited,
             stages: stages.rows(&opened.zone),
             stage_faces: stages.face_bytes(),
-            journal: journal.row(clock),
+            journal: journal.row(&clock),
             traffic: traffic_of(pages, journal.frames_used),
         };
         Ok((receipt, opened.report))

@@ -1,9 +1,7 @@
 //! The journal row of a cut.
 
-use std::time::Instant;
-
-use crate::pipeline::seal::totals::journal;
-use tetdb_base::storage::PagerStats;
+use crate::pipeline::seal::totals::{by_threads, journal};
+use tetdb_base::storage::{PagerStats, StepClock};
 use tetdb_kernel::bisect::CutReport;
 use tetdb_schema::catalog::{JournalRow, StoreState};
 
@@ -19,7 +17,7 @@ pub struct CutJournal<'a> {
 
 impl CutJournal<'_> {
     /// Returns the row of a cut that began at `clock`.
-    pub fn row(&self, clock: Instant) -> JournalRow {
+    pub fn row(&self, clock: &StepClock) -> JournalRow {
         let (report, interface) = (self.report, &self.report.interface);
         let (natural, chosen) = (&interface.natural, &interface.chosen);
         let layers_least = report.layers_least.map_or(f64::INFINITY, f64::from);
@@ -54,7 +52,8 @@ impl CutJournal<'_> {
             ("pages_written", self.pages.pages_written as f64),
             ("frames_used", self.frames_used as f64),
         ];
-        let mut row = journal(StoreState::Bisected, "bisect", clock, &measures);
+        let measures: Vec<_> = measures.into_iter().chain(by_threads(clock)).collect();
+        let mut row = journal(StoreState::Bisected, "bisect", clock.begun(), &measures);
         row.subdomain = Some(self.subdomain);
         row
     }

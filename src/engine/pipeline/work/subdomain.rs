@@ -1,7 +1,6 @@
 //! One sub-domain: a worker saturates, optimizes and seals it alone.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 
 use tetdb_schema::ids::SubdomainId;
 
@@ -15,9 +14,9 @@ use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::compact::seal;
 use crate::pipeline::seal::target::SealTarget;
-use crate::pipeline::seal::totals::{journal, totals_of};
+use crate::pipeline::seal::totals::{by_threads, journal, totals_of};
 use crate::pipeline::tree::open_subtree;
-use tetdb_base::storage::{Backing, DiskPath, PagerStats, attempt};
+use tetdb_base::storage::{Backing, DiskPath, PagerStats, StepClock, attempt};
 use tetdb_kernel::bisect::Zone;
 use tetdb_kernel::mesh::Mesh;
 use tetdb_kernel::sizing::{SizeField, TETS_PER_LOAD};
@@ -59,7 +58,7 @@ pub struct FinishedSubdomain {
     pub pages: PagerStats,
     pub frames_used: usize,
     pub seal_seconds: f64,
-    pub clock: Instant,
+    pub clock: StepClock,
 }
 
 impl SubdomainJob {
@@ -92,13 +91,13 @@ impl SubdomainJob {
         common: Common,
         watch: &Watcher,
     ) -> Result<FinishedSubdomain, PipelineError> {
-        let clock = Instant::now();
+        let clock = StepClock::start();
         let (rank, coarse) = (self.mesh.ranks.first, self.mesh.generation);
         let kept = match &self.kept {
             Some(path) => Some(save(&mut mesh, path, rank, coarse, self.share.buffers)?),
             None => None,
         };
-        let keep_s = clock.elapsed().as_secs_f64();
+        let keep_s = clock.seconds();
         let fine = saturate_and_optimize(
             &mut mesh,
             self.field.as_ref().unwrap_or(common.field),
@@ -118,9 +117,9 @@ impl SubdomainJob {
             bounds: common.bounds,
             owners: Some(&self.owners),
         };
-        let seal_clock = Instant::now();
+        let seal_clock = StepClock::start();
         let sealed = seal(&mut mesh, &target, watch)?;
-        let seal_seconds = seal_clock.elapsed().as_secs_f64();
+        let seal_seconds = seal_clock.seconds();
         let pager = mesh.into_pages();
         let (pages, frames_used) = (pager.stats(), pager.frames_used());
         drop(pager);
@@ -160,7 +159,8 @@ impl FinishedSubdomain {
             ("seal_s", self.seal_seconds),
         ];
         let step = "saturate, optimize, seal";
-        let mut journal = journal(StoreState::Bisected, step, self.clock, &measures);
+        let measures: Vec<_> = measures.into_iter().chain(by_threads(&self.clock)).collect();
+        let mut journal = journal(StoreState::Bisected, step, self.clock.begun(), &measures);
         journal.subdomain = Some(self.mesh.ranks.first);
         SubdomainReceipt {
             coarse: self.mesh.generation,
