@@ -58,11 +58,11 @@ pub use remote::RemoteFailure;
 pub use reserve::{filled, push, reserve};
 pub use run_context::{
     CaughtPanic, RunContext, for_each_mut, in_place_scope, join, map_into, map_long, n_threads,
-    parallel, spare_threads,
+    parallel, shared_tasks, spare_threads,
 };
 pub use shelf::{Shelf, Shelved};
 pub use sort::{Sorted, Sorter};
 pub use sort_record::sort_record;
 pub use sort_record::{KeyedId, Payload, SortBytes, SortField, SortRecord, total_order};
 pub use spill_vec::{FrozenSpillVec, ScratchSpace, SpillVec, SpillVecBuilder};
-pub use step_clock::{SharedSeconds, StepClock, shared_tasks};
+pub use step_clock::{SharedSeconds, StepClock};

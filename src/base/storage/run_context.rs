@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 
 use super::cancel_token::CancelToken;
-use super::step_clock::shared;
+use super::step_clock::{in_order, shared};
 
 /// Small items that are worth handing to another thread.
 const ITEMS_MIN: usize = 1024;
@@ -162,8 +162,22 @@ impl Drop for Pool {
 pub fn parallel<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let pool = RunContext::current().and_then(|context| context.pool);
     match pool.as_ref().and_then(|pool| pool.threads()) {
-        Some(threads) => shared(|| threads.install(work)),
-        None => shared(work),
+        Some(threads) => shared(spare_threads(), || threads.install(work)),
+        None => work(),
+    }
+}
+
+/// Does `work` that threads would share if there were any to spare.
+fn counted<T>(work: impl FnOnce() -> T) -> T {
+    if RunContext::is_in_pool() { work() } else { shared(1, work) }
+}
+
+/// Does tasks in an order, on threads that `work` starts; it returns the seconds of all of them and of the longest chain.
+pub fn shared_tasks(work: impl FnOnce() -> [f64; 2]) {
+    if RunContext::is_in_pool() {
+        work();
+    } else {
+        in_order(work);
     }
 }
 
@@ -173,7 +187,7 @@ pub fn join<A: Send, B: Send>(
     b: impl FnOnce() -> B + Send,
 ) -> (A, B) {
     match spare_threads() {
-        1 => shared(|| (a(), b())),
+        1 => counted(|| (a(), b())),
         _ => parallel(|| rayon::join(a, b)),
     }
 }
@@ -181,7 +195,7 @@ pub fn join<A: Send, B: Send>(
 /// Does `work` on each item, side by side where a thread is to spare.
 pub fn for_each_mut<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Sync + Send) {
     match spare_threads() {
-        1 => shared(|| items.iter_mut().for_each(work)),
+        1 => counted(|| items.iter_mut().for_each(work)),
         _ => parallel(|| items.par_iter_mut().for_each(work)),
     }
 }
@@ -193,7 +207,7 @@ pub fn map_into<T: Sync, U: Send>(
     found: impl Fn(&T) -> U + Sync + Send,
 ) {
     match spare_threads() {
-        1 => shared(|| {
+        1 => counted(|| {
             all.clear();
             all.extend(items.iter().map(found));
         }),
@@ -207,7 +221,7 @@ pub fn map_into<T: Sync, U: Send>(
 /// The results of `found` for items that take long each, in order; in parallel if a thread is free.
 pub fn map_long<T: Sync, U: Send>(items: &[T], found: impl Fn(&T) -> U + Sync + Send) -> Vec<U> {
     if items.len() < 2 || spare_threads() == 1 {
-        return shared(|| items.iter().map(found).collect());
+        return counted(|| items.iter().map(found).collect());
     }
     parallel(|| items.par_iter().map(found).collect())
 }

@@ -1,12 +1,10 @@
 //! Seconds of a step, by how many threads could have shared them.
 //!
 //! A forecast for more threads needs to know what only one thread could do. What goes through [`parallel`](super::parallel) and
-//! its like is measured here as it begins and ends, on the thread that asked for it.
+//! its like is measured as it begins and ends, on the thread of the step.
 
 use std::cell::Cell;
 use std::time::Instant;
-
-use super::run_context::{RunContext, spare_threads};
 
 thread_local! {
     static SHARED: Cell<SharedSeconds> = const { Cell::new(SharedSeconds::NONE) };
@@ -30,8 +28,8 @@ impl SharedSeconds {
     const NONE: Self = Self { clock: 0.0, parallel: 0.0, tasks: 0.0, chain: 0.0 };
 }
 
-/// Runs `work` as a section that threads share, and adds what `add` says of its result and its seconds. The thread that asked counts: not
-/// those of a pool, and not what is inside of another section.
+/// Runs `work` as a section that threads share, and adds what `add` says of its result and its seconds. Nothing is counted inside of another
+/// section.
 fn section<T>(work: impl FnOnce() -> T, add: impl FnOnce(&mut SharedSeconds, &T, f64)) -> T {
     struct Leave;
     impl Drop for Leave {
@@ -39,10 +37,9 @@ fn section<T>(work: impl FnOnce() -> T, add: impl FnOnce(&mut SharedSeconds, &T,
             IS_WITHIN.set(false);
         }
     }
-    if IS_WITHIN.get() || RunContext::is_in_pool() {
+    if IS_WITHIN.replace(true) {
         return work();
     }
-    IS_WITHIN.set(true);
     let leave = Leave;
     let begun = Instant::now();
     let result = work();
@@ -55,13 +52,13 @@ fn section<T>(work: impl FnOnce() -> T, add: impl FnOnce(&mut SharedSeconds, &T,
     result
 }
 
-/// Runs `work` that the spare threads share without order.
-pub(super) fn shared<T>(work: impl FnOnce() -> T) -> T {
-    section(work, |sum, _, seconds| sum.parallel += spare_threads() as f64 * seconds)
+/// Runs `work` that `threads` share without order.
+pub(super) fn shared<T>(threads: usize, work: impl FnOnce() -> T) -> T {
+    section(work, |sum, _, seconds| sum.parallel += threads as f64 * seconds)
 }
 
 /// Runs `work` that does tasks in an order; it returns the seconds of all of them and of the longest chain.
-pub fn shared_tasks(work: impl FnOnce() -> [f64; 2]) {
+pub(super) fn in_order(work: impl FnOnce() -> [f64; 2]) {
     section(work, |sum, [tasks, chain], _| {
         sum.tasks += tasks;
         sum.chain += chain;
@@ -106,7 +103,9 @@ impl StepClock {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::storage::{CancelToken, parallel};
+    use crate::storage::{
+        CancelToken, RunContext, StorageError, attempt, parallel, raise, shared_tasks,
+    };
     use std::thread::sleep;
     use std::time::Duration;
 
@@ -134,9 +133,7 @@ mod tests {
     #[test]
     fn an_unwound_section_leaves_no_trace() {
         RunContext::new(1, CancelToken::default()).enter(|| {
-            let _ = crate::storage::attempt(|| {
-                shared_tasks(|| crate::storage::raise(crate::storage::StorageError::Cancelled))
-            });
+            assert!(attempt(|| shared_tasks(|| raise(StorageError::Cancelled))).is_err());
             let clock = StepClock::start();
             shared_tasks(|| [2.0, 1.0]);
             assert_eq!(clock.shared().tasks, 2.0);
