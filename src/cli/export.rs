@@ -216,15 +216,18 @@ pub fn write(
 
 /// Says that a format has numbers only where the store has names.
 fn note_numbers(format: MeshFormat, store: &Store, console: &Console) {
-    use MeshFormat::{Gmsh22, Medit, MeditBinary, Numpy, TetGen};
+    use MeshFormat::{Gmsh22, Medit, MeditBinary, Nastran, Numpy, TetGen};
     let summary = store.summary();
     if let Some(set) = summary.label_sets.first()
-        && matches!(format, Gmsh22 | Medit | MeditBinary | Numpy | TetGen)
+        && matches!(format, Gmsh22 | Medit | MeditBinary | Nastran | Numpy | TetGen)
     {
         let name = &summary.labels[set.label as usize];
         console.note(&format!(
             "note: this format has one label for a triangle; those of several groups have one of their own, such as {name}"
         ));
+    }
+    if format == Nastran {
+        console.note("note: this format rounds coordinates to 16 characters, 11 to 15 digits");
     }
     let is_name = |name: &String| name.parse::<u64>().is_err();
     if matches!(format, Medit | MeditBinary | Numpy | TetGen)

@@ -20,6 +20,7 @@ fn the_standard_output_gets_the_bytes_of_the_file() {
         ("a.inp", "inp"),
         ("a.mfem", "mfem"),
         ("a.su2", "su2"),
+        ("a.bdf", "bdf"),
     ] {
         place.run_line(&format!("export two.tetdb {name}")).succeeds();
         let before = place.names();
@@ -31,6 +32,7 @@ fn the_standard_output_gets_the_bytes_of_the_file() {
     }
     for refused in [
         "export two.tetdb - --format vtkhdf",
+        "export two.tetdb - --format exo",
         "export two.tetdb - --format mesh --json",
         "export two.tetdb - --format mesh --pieces",
         "export two.tetdb b.vtu --ascii",

@@ -101,6 +101,28 @@ fn values_are_the_same_whatever_they_come_from() {
 }
 
 #[test]
+fn integers_that_no_double_holds_are_left_out_of_files_of_doubles() {
+    let place = Place::new();
+    place.run_line("mesh sample:box,h=0.5 -o a.tetdb --no-verify").succeeds();
+    let info = place.run_line("info a.tetdb --json").succeeds().json();
+    let n = info["tets"].as_u64().expect("a number");
+    let values = |from: u64| (from..from + n).flat_map(u64::to_le_bytes).collect::<Vec<u8>>();
+    place.write("large.npy", npy("<i8", &format!("({n},)"), &values(1 << 53)));
+    place.write("small.npy", npy("<i8", &format!("({n},)"), &values(0)));
+    for name in ["large", "small"] {
+        let line = format!("field a.tetdb add {name} --at tets --from {name}.npy");
+        place.run_line(&line).succeeds();
+    }
+    for (file, is_noted) in [("a.exo", true), ("a.msh", true), ("a.xdmf", false), ("a.npy", false)]
+    {
+        let said = place.run_line(&format!("export a.tetdb {file}")).succeeds().stderr();
+        let note = format!("note: {file} is written without large: doubles do not hold");
+        assert_eq!(said.contains(&note), is_noted, "{said}");
+        assert!(!said.contains("without small"), "{said}");
+    }
+}
+
+#[test]
 fn bad_input_is_refused_with_its_place() {
     let place = Place::new();
     place.run_line("mesh sample:box,h=0.5 -o a.tetdb --no-verify").succeeds();

@@ -29,8 +29,8 @@ TOOLS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 sys.path.insert(0, TOOLS)
 from carriers import ENV, Bench, Differs, run  # noqa: E402
 
-NAMES = ["a.vtu", "a.pvtu", "a.vtkhdf", "a.foam", "a.msh", "a.mesh", "a.meshb", "a.mfem", "a.inp", "a.su2", "a.ele", "a.npy", "a.json"]
-PIECES = ["a.vtu", "a.foam", "a.msh", "a.mesh", "a.meshb", "a.mfem", "a.inp", "a.su2", "a.ele", "a.npy"]
+NAMES = ["a.vtu", "a.pvtu", "a.vtkhdf", "a.xdmf", "a.exo", "a.bdf", "a.foam", "a.msh", "a.mesh", "a.meshb", "a.mfem", "a.inp", "a.su2", "a.ele", "a.npy", "a.json"]
+PIECES = ["a.vtu", "a.xdmf", "a.exo", "a.bdf", "a.foam", "a.msh", "a.mesh", "a.meshb", "a.mfem", "a.inp", "a.su2", "a.ele", "a.npy"]
 CASES = [[n] for n in NAMES] + [["a.msh", "--format", "msh22"], ["a.msh", "--ghosts"], ["a.msh", "--pieces", "--ghosts"],
          ["a.foam", "--pieces"], ["a.mfem", "--pieces"], ["a.vtu", "--order", "2"], ["a.vtkhdf", "--region", "1"]]
 KILLS_PER_MESH = 6

@@ -100,8 +100,8 @@ pub struct ExportArgs {
     /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .mfem (MFEM), .ele (TetGen),
-    /// .inp, .su2, .npy (one file per array), .json (topology), .csv and .jsonl (the rows of `tetdb query`), .parquet (where built in); `-` with --format is standard output
+    /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .xdmf, .exo and .e (Exodus II), .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .mfem (MFEM), .ele (TetGen),
+    /// .inp, .bdf and .nas (Nastran), .su2, .npy (one file per array), .json (topology), .csv and .jsonl (the rows of `tetdb query`), .parquet (where built in); `-` with --format is standard output
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
     /// The format, where the name does not tell it: vtu, msh and so on, or msh22 for Gmsh's old format
@@ -116,7 +116,7 @@ pub struct ExportArgs {
     /// Text instead of binary numbers (.msh, .foam)
     #[arg(long)]
     pub ascii: bool,
-    /// Nodes of the elements: 1, corners; 2, also the midpoints of edges (.vtu, .pvtu, .vtkhdf, .msh, .inp)
+    /// Nodes of the elements: 1, corners; 2, also the midpoints of edges (.vtu, .pvtu, .vtkhdf, .xdmf, .exo, .msh, .inp, .bdf)
     #[arg(long, value_name = "ORDER", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     pub order: u8,
     /// List in .msh, for each partition, the tetrahedra of others that touch it

@@ -13,6 +13,10 @@ use tetdb_store::store::Catalog;
 /// Largest memory of a writer, whatever the cap.
 const MEMORY_MAX: u64 = 512 << 20;
 
+/// Why a file of another format has no fields.
+const FIELD_FORMATS: &str =
+    "fields are written to .vtu, .pvtu, .vtkhdf, .xdmf, .exo, .msh, .npy and .parquet";
+
 /// Options of an export. Default: the whole mesh, in one file.
 #[derive(Clone, Debug, Default)]
 pub struct ExportOptions {
@@ -82,7 +86,7 @@ impl ExportOptions {
         self
     }
 
-    /// Writes all sub-domains as one partition, each vertex once; for `.vtkhdf`. Some programs ask for it, DOLFINx among them.
+    /// Writes all sub-domains as one partition, each vertex once; for `.vtkhdf`, with cells of VTK's Lagrange kinds. DOLFINx asks for it.
     pub fn one_partition(mut self) -> Self {
         self.selection.one_partition = true;
         self
@@ -94,8 +98,8 @@ impl ExportOptions {
         self
     }
 
-    /// Writes elements with nodes in the middle of edges: 10 for a tetrahedron, 6 for a triangle. For `.vtu`, `.pvtu`, `.vtkhdf`, `.msh`
-    /// and `.inp`.
+    /// Writes elements with nodes in the middle of edges: 10 for a tetrahedron, 6 for a triangle. For `.vtu`, `.pvtu`, `.vtkhdf`, `.xdmf`,
+    /// `.exo`, `.msh`, `.inp` and `.bdf`.
     pub fn second_order(mut self) -> Self {
         self.selection.order = ElementOrder::Second;
         self
@@ -141,8 +145,8 @@ impl ExportOptions {
 impl Store {
     /// Writes the mesh for another program. The ending of `out` selects the format.
     ///
-    /// Endings: `.vtu`, `.pvtu`, `.vtkhdf`, `.foam` (OpenFOAM), `.msh`, `.mesh`, `.meshb`, `.mfem`, `.ele` (TetGen), `.inp`, `.su2`, `.npy`,
-    /// `.json` (neighbors of sub-domains), and `.parquet` with that feature. The mesh is streamed. A file gets its name only when it is
+    /// Endings: `.vtu`, `.pvtu`, `.vtkhdf`, `.xdmf`, `.exo` and `.e` (Exodus II), `.foam` (OpenFOAM), `.msh`, `.mesh`, `.meshb`, `.mfem`, `.ele` (TetGen),
+    /// `.inp`, `.bdf` and `.nas` (Nastran), `.su2`, `.npy`, `.json` (neighbors of sub-domains), and `.parquet` with that feature. The mesh is streamed. A file gets its name only when it is
     /// complete.
     ///
     /// Errors: `usage` for a folder or the surface that the store was made from; `unknown-format`, `format-limit`, `disk-full`; damage.
@@ -173,20 +177,29 @@ impl Store {
         out: &Path,
         selection: &ExportSelection,
     ) -> Result<(), Error> {
-        let has_fields = write::check(out, selection)?.has_fields();
+        let format = write::check(out, selection)?;
         let has_vertices = selection.order == ElementOrder::First && !selection.split_sheets;
-        let mut fields = catalog.fields()?;
-        fields.retain(|field| !has_fields || field.place == FieldPlace::Vertices && !has_vertices);
-        if !fields.is_empty() && selection.content == Content::Mesh {
-            let names: Vec<&str> = fields.iter().map(|field| &*field.name).collect();
-            let why = match has_fields {
-                true => "it has vertices that the store does not have",
-                false => "fields are written to .vtu, .pvtu, .vtkhdf and .npy",
+        let parts = catalog.field_parts()?;
+        let mut lacking: Vec<(&str, Vec<String>)> = Vec::new();
+        for field in catalog.fields()? {
+            let why = if !format.has_fields() {
+                FIELD_FORMATS
+            } else if field.place == FieldPlace::Vertices && !has_vertices {
+                "it has vertices that the store does not have"
+            } else if format.has_doubles() && !write::fits_doubles(&field, &parts) {
+                "doubles do not hold all of these integers"
+            } else {
+                continue;
             };
+            match lacking.iter_mut().find(|row| row.0 == why) {
+                Some(row) => row.1.push(field.name),
+                None => lacking.push((why, vec![field.name])),
+            }
+        }
+        for (why, names) in lacking.into_iter().filter(|_| selection.content == Content::Mesh) {
             let (out, names) = (out.display(), names.join(", "));
             self.settings().note(format!("note: {out} is written without {names}: {why}"));
         }
-        let format = write::check(out, selection)?;
         let has_pairs = selection.has_periodic(format) || format == MeshFormat::Topology;
         if !has_pairs && selection.content == Content::Mesh && !catalog.periodic()?.is_empty() {
             let why = "they need one number for each vertex of the whole mesh";

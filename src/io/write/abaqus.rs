@@ -11,9 +11,9 @@ use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::names::set_names;
 use super::output_files::OutputFiles;
+use super::sides::{ElementSide, SideSorter};
 use super::stream::Stream;
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
-use tetdb_store::sealed::{FaceJoin, FaceJoinSorter};
 
 /// The element's face opposite each of its nodes.
 const SIDE_OPPOSITE: [u8; 4] = [3, 4, 2, 1];
@@ -28,26 +28,16 @@ sort_record! {
     }
 }
 
-sort_record! {
-    /// A face of an element in the surface of a label.
-    struct ElementSide {
-        label: u32,
-        element: u64,
-        /// The element's name of the face.
-        side: u8,
-    }
-}
-
 pub(super) fn write(
     mesh: &mut Merged,
     outputs: &mut OutputFiles,
     out: &Path,
     midpoints: Option<&Midpoints>,
 ) -> Result<()> {
-    mesh.check_limits(out, i32::MAX as u64)?;
+    let n_midpoints = midpoints.map_or(0, Midpoints::n);
+    mesh.check_limits(out, i32::MAX as u64, n_midpoints)?;
     mesh.expect_passes(1, 1);
     let digits = u64::from(mesh.n_vertices().max(1).ilog10());
-    let n_midpoints = midpoints.map_or(0, Midpoints::n);
     let numbers = if n_midpoints > 0 { 11 } else { 5 };
     let bytes = 60 * (mesh.n_vertices() + n_midpoints) + numbers * (digits + 2) * mesh.n_tets();
     let path = outputs.create(out, bytes)?;
@@ -93,22 +83,13 @@ fn elements(
         _ => stream.text(&format!("*ELEMENT, TYPE={kind}, ELSET=all_elements\n")),
     }
     let mut by_region = Sorter::new(dir, mesh.sorter_bytes() / 2);
-    let mut sides = Sorter::new(dir, mesh.sorter_bytes() / 2);
-    let mut faces = faces_by_tet(mesh, dir)?;
-    let groups = groups(mesh);
+    let mut sides = SideSorter::new(mesh, dir, SIDE_OPPOSITE)?;
     let mut number = 0u64;
     let first_midpoint = mesh.n_vertices() + 1;
     let mut edges = midpoints.map(Midpoints::tets).transpose()?;
     mesh.tets(|tet| {
-        while let Some(face) = faces.next_below(number as u32 + 1)? {
-            let outside = |v: &u64| !face.vertices.contains(&(*v as u32));
-            let opposite = tet.nodes.iter().position(outside).unwrap_or(0);
-            let (element, side) = (number + 1, SIDE_OPPOSITE[opposite]);
-            for &label in &groups[&face.mark] {
-                sides.push(ElementSide { label, element, side })?;
-            }
-        }
         number += 1;
+        sides.add(tet, number)?;
         if regions.len() > 1 {
             let set = tet.region;
             by_region.push(Member { set, number })?;
@@ -122,12 +103,7 @@ fn elements(
     })?;
     let head = |region: u32| format!("*ELSET, ELSET={}\n", regions[&region]);
     sets(by_region.finish()?, head, stream)?;
-    Ok(sides.finish()?)
-}
-
-/// The groups of each label that faces have.
-fn groups(mesh: &Merged) -> BTreeMap<u32, Vec<u32>> {
-    mesh.labels().into_keys().map(|label| (label, mesh.label_members(label))).collect()
+    sides.finish()
 }
 
 /// Embedded edges as sets of T3D2 elements, points as sets of nodes.
@@ -150,16 +126,6 @@ fn embedded(mesh: &Merged, stream: &mut Stream) {
         }
         stream.text(&format!("{}\n", point.vertex + 1));
     }
-}
-
-/// The boundary faces by tetrahedron, marked by their labels. All numbers have 31 bits.
-fn faces_by_tet(mesh: &Merged, dir: &Path) -> Result<FaceJoin> {
-    let mut sorter = FaceJoinSorter::new(dir, mesh.sorter_bytes());
-    mesh.faces().each(|face| {
-        let vertices = face.vertices.map(|v| v as u32);
-        Ok(sorter.push(face.tet as u32, vertices, false, face.label)?)
-    })?;
-    Ok(sorter.finish()?)
 }
 
 /// Writes sorted members as sets, each after its head; equal records count once.
@@ -220,7 +186,7 @@ fn node_sets(
     stream: &mut Stream,
     midpoints: Option<&Midpoints>,
 ) -> Result<()> {
-    let groups = groups(mesh);
+    let groups = mesh.members();
     let mut sorter = Sorter::new(dir, mesh.sorter_bytes());
     let mut edges = midpoints.map(Midpoints::faces).transpose()?;
     mesh.faces().each(|face| {

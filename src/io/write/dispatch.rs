@@ -12,7 +12,9 @@ use super::periodic::WrittenPeriodic;
 use super::report::FileCounts;
 use super::selection::{Content, ElementOrder, ExportSelection};
 use super::writers::{Writers, is_first};
-use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, su2, tetgen, vtk};
+use super::{
+    abaqus, exodus, foam, gmsh, gmsh22, medit, mfem, nastran, npy_columns, su2, tetgen, vtk, xdmf,
+};
 
 /// Writes a mesh as one file with its side files. Several `writers` may share the tetrahedra of `.vtkhdf`; the first writes the rest.
 pub(super) fn write(
@@ -37,18 +39,22 @@ pub(super) fn write(
         tets: mesh.n_tets(),
         triangles: mesh.n_faces(),
     };
+    let hdf = Some(match selection.one_partition {
+        true => vtk::VtkCells::Lagrange,
+        false => vtk::VtkCells::OfOrder,
+    });
     match format {
         MeshFormat::Vtu | MeshFormat::VtkHdf if selection.content != Content::Mesh => {
             mesh.expect_passes(1, 0);
-            let is_hdf = format == MeshFormat::VtkHdf;
-            counts.vertices = vtk::write_boundary(mesh, outputs, out, is_hdf, midpoints)?;
+            let hdf = hdf.filter(|_| format == MeshFormat::VtkHdf);
+            counts.vertices = vtk::write_boundary(mesh, outputs, out, hdf, midpoints)?;
             counts.tets = 0;
         }
         MeshFormat::Vtu | MeshFormat::Pvtu => {
-            vtk::write(mesh, outputs, out, false, midpoints, None)?
+            vtk::write(mesh, outputs, out, None, midpoints, None)?
         }
         MeshFormat::VtkHdf => {
-            vtk::write(mesh, outputs, out, true, midpoints, writers)?;
+            vtk::write(mesh, outputs, out, hdf, midpoints, writers)?;
             if !is_first(writers) {
                 return Ok(FileCounts::default());
             }
@@ -60,6 +66,9 @@ pub(super) fn write(
         }
         MeshFormat::Gmsh22 => gmsh22::write(mesh, outputs, out)?,
         MeshFormat::Abaqus => abaqus::write(mesh, outputs, out, midpoints)?,
+        MeshFormat::Exodus => exodus::write(mesh, outputs, out, midpoints)?,
+        MeshFormat::Xdmf => xdmf::write(mesh, outputs, out, midpoints)?,
+        MeshFormat::Nastran => nastran::write(mesh, outputs, out, midpoints)?,
         MeshFormat::Su2 => counts.triangles = su2::write(mesh, outputs, out)?,
         MeshFormat::Numpy => npy_columns::write(mesh, outputs, out, &periodic)?,
         #[cfg(feature = "parquet")]

@@ -35,6 +35,12 @@ pub enum MeshFormat {
     /// Apache Parquet: of each sub-domain the tetrahedra `NAME_00007.parquet` and the vertices `NAME_00007_vertices.parquet`.
     #[cfg(feature = "parquet")]
     Parquet,
+    /// Exodus II, netCDF classic: a block for each region, a side set for each label.
+    Exodus,
+    /// XDMF with arrays in `NAME.h5`, the boundary in `NAME_boundary.xdmf` and `.h5`.
+    Xdmf,
+    /// Nastran bulk data.
+    Nastran,
     /// JSON: the neighbors of each sub-domain, and the vertices and faces that each two sub-domains share.
     Topology,
 }
@@ -73,6 +79,9 @@ const FORMATS: &[(&str, MeshFormat, u16)] = {
         ("mfem", Mfem, TEXT.0 | SUBDOMAINS.0 | REGIONS.0 | STREAM.0 | SLITS.0),
         ("ele", TetGen, TEXT.0 | PARTS | SLITS.0),
         ("inp", Abaqus, TEXT.0 | ORDER_2 | PARTS | STREAM.0 | SLITS.0),
+        ("exo", Exodus, ORDER_2 | PARTS | SLITS.0),
+        ("xdmf", Xdmf, ORDER_2 | PARTS | SLITS.0),
+        ("bdf", Nastran, TEXT.0 | ORDER_2 | PARTS | STREAM.0 | SLITS.0),
         ("su2", Su2, TEXT.0 | PARTS | STREAM.0),
         ("npy", Numpy, PARTS | SLITS.0),
         #[cfg(feature = "parquet")]
@@ -81,10 +90,15 @@ const FORMATS: &[(&str, MeshFormat, u16)] = {
     ]
 };
 
+/// Other endings, each with the word of its format.
+const OTHER_ENDINGS: &[(&str, &str)] = &[("e", "exo"), ("nas", "bdf")];
+
 impl MeshFormat {
     /// The format of a file name's extension.
     pub fn from_extension(path: &Path) -> Option<Self> {
-        Self::from_word(&path.extension()?.to_str()?.to_ascii_lowercase())
+        let word = path.extension()?.to_str()?.to_ascii_lowercase();
+        let other = OTHER_ENDINGS.iter().find(|row| row.0 == word);
+        Self::from_word(other.map_or(&word, |row| row.1))
     }
 
     /// The format of this word: an ending without its dot, or `msh22`.
@@ -116,7 +130,17 @@ impl MeshFormat {
 
     /// Returns whether the format has the values of fields.
     pub fn has_fields(self) -> bool {
-        matches!(self, Self::Vtu | Self::Pvtu | Self::VtkHdf | Self::Numpy)
+        #[cfg(feature = "parquet")]
+        if self == Self::Parquet {
+            return true;
+        }
+        let keeps_types = [Self::Vtu, Self::Pvtu, Self::VtkHdf, Self::Xdmf, Self::Numpy];
+        keeps_types.contains(&self) || self.has_doubles()
+    }
+
+    /// Returns whether the values of fields are doubles, whatever their type.
+    pub fn has_doubles(self) -> bool {
+        matches!(self, Self::Exodus | Self::Gmsh)
     }
 
     /// Returns whether pieces of the format have numbers of the whole, so that the whole is open while they are written.
@@ -127,7 +151,7 @@ impl MeshFormat {
 
 /// Endings of the formats.
 pub const ENDINGS: &str = if cfg!(feature = "parquet") {
-    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .su2, .npy, .parquet or .json"
+    ".vtu, .pvtu, .vtkhdf, .xdmf, .exo, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .bdf, .su2, .npy, .parquet or .json"
 } else {
-    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .su2, .npy or .json (.parquet needs a build with the feature `parquet`)"
+    ".vtu, .pvtu, .vtkhdf, .xdmf, .exo, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .bdf, .su2, .npy or .json (.parquet needs a build with the feature `parquet`)"
 };

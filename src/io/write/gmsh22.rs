@@ -22,7 +22,7 @@ const N_TAGS: u32 = 2;
 const N_TAGS_PARTITIONED: u32 = 4;
 
 pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<()> {
-    mesh.check_limits(out, i32::MAX as u64)?;
+    mesh.check_limits(out, i32::MAX as u64, 0)?;
     mesh.expect_passes(1, 1);
     let elements_bytes = 24 * mesh.n_faces() + 28 * mesh.n_tets();
     let partition_bytes = 8 * (mesh.n_faces() + mesh.n_tets());

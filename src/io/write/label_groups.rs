@@ -12,6 +12,11 @@ impl Merged<'_> {
         labels::members(&self.label_sets, &label).to_vec()
     }
 
+    /// The groups of each label that faces have, as [`Merged::label_members`].
+    pub fn members(&self) -> BTreeMap<u32, Vec<u32>> {
+        self.labels().into_keys().map(|label| (label, self.label_members(label))).collect()
+    }
+
     /// Names of the groups the faces are in, ascending by label.
     pub fn groups(&self) -> BTreeMap<u32, String> {
         let members = self.labels().into_keys().flat_map(|label| self.label_members(label));

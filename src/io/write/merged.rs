@@ -12,7 +12,7 @@ use super::doubles::Doubles;
 use super::embedded::{WrittenEmbedded, memory_left};
 use super::error::{Result, WriteError};
 use super::faces::{FaceSorter, FaceSource, MergedFace, MergedFaces};
-use super::merged_fields::{FieldChunk, open_fields};
+use super::merged_fields::{FieldChunk, fits_doubles, open_fields};
 use super::merged_parts::{collect_faces, misplaced, required_faces, sources};
 use super::numbering::{Numbering, PartNumbers, Sharer, Source, shareable_vertices, sharers};
 use super::read_progress::ReadProgress;
@@ -154,10 +154,17 @@ impl<'a> Merged<'a> {
     }
 
     /// Reads the fields with all later passes, and returns those at vertices and at tetrahedra. Vertices that are not in the store
-    /// have no values, so with them fields at vertices are left out. Errors: damage.
-    pub fn read_fields(&mut self, has_more_vertices: bool) -> Result<[Vec<FieldRow>; 2]> {
+    /// have no values, so with them fields at vertices are left out; with `as_doubles`, those whose integers no double holds. Errors: damage.
+    pub fn read_fields(
+        &mut self,
+        has_more_vertices: bool,
+        as_doubles: bool,
+    ) -> Result<[Vec<FieldRow>; 2]> {
+        let parts = self.store.field_parts()?;
+        let mut fields = self.store.fields()?;
+        fields.retain(|field| !as_doubles || fits_doubles(field, &parts));
         let (vertices, tets) =
-            self.store.fields()?.into_iter().partition(|field| field.place == FieldPlace::Vertices);
+            fields.into_iter().partition(|field| field.place == FieldPlace::Vertices);
         self.fields = match has_more_vertices || self.doubles.is_some() {
             true => [Vec::new(), tets],
             false => [vertices, tets],
@@ -342,10 +349,11 @@ impl<'a> Merged<'a> {
         (self.progress.report)(total, total);
     }
 
-    /// Refuses a mesh with more vertices or elements than `limit`.
-    pub fn check_limits(&self, out: &Path, limit: u64) -> Result<()> {
+    /// Refuses a mesh with more vertices, `n_midpoints` among them, or elements than `limit`.
+    pub fn check_limits(&self, out: &Path, limit: u64, n_midpoints: u64) -> Result<()> {
         let elements = self.n_tets() + self.n_faces();
-        for (what, found) in [("vertices", self.n_vertices()), ("elements", elements)] {
+        let vertices = self.n_vertices() + n_midpoints;
+        for (what, found) in [("vertices", vertices), ("elements", elements)] {
             if found > limit {
                 let path = out.to_owned();
                 return Err(WriteError::TooLarge { path, what, limit, found });
@@ -472,26 +480,5 @@ impl<'a> Merged<'a> {
             }
         }
         Ok(())
-    }
-
-    /// The regions that have tetrahedra; decodes only chunks with several.
-    ///
-    /// Errors: damage.
-    pub fn regions(&mut self) -> Result<BTreeSet<u32>> {
-        let mut regions = BTreeSet::new();
-        for source in &self.parts {
-            let rank = source.row.rank;
-            let mut part = self.store.open_subdomain(rank, self.memory / 4)?;
-            for chunk in 0..part.tet_summaries().len() {
-                let [least, greatest] = part.tet_summaries()[chunk].regions;
-                regions.extend([least, greatest]);
-                if greatest.saturating_sub(least) > 1 {
-                    let chunk = part.tet_chunk(chunk as u32)?;
-                    regions.extend(chunk.records.iter().map(|t| t.region));
-                }
-            }
-        }
-        regions.retain(|&region| self.writes(region));
-        Ok(regions)
     }
 }

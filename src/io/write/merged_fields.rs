@@ -1,7 +1,7 @@
 //! Values of fields beside the vertices and tetrahedra of a merged mesh.
 
 use super::error::Result;
-use tetdb_schema::field::FieldRow;
+use tetdb_schema::field::{FieldNumber, FieldPart, FieldRow};
 use tetdb_store::sealed::{FieldFile, Subdomain};
 use tetdb_store::store::Catalog;
 
@@ -32,4 +32,21 @@ pub(super) fn open_fields(
     part: &Subdomain,
 ) -> Result<Vec<FieldFile>> {
     fields.iter().map(|field| Ok(store.open_field(field, part, FIELD_BYTES)?)).collect()
+}
+
+/// Returns whether doubles hold all values of a field. Ranges are rounded, so 2^53 itself is not let through.
+pub fn fits_doubles(field: &FieldRow, parts: &[FieldPart]) -> bool {
+    let own = parts.iter().filter(|part| part.field == field.id);
+    let mut ranges = own.flat_map(|part| &part.ranges);
+    let limit = (1u64 << 53) as f64;
+    field.number != FieldNumber::I64 || ranges.all(|range| range.low > -limit && range.high < limit)
+}
+
+/// The words of the values of some fields at a place as doubles.
+pub(super) fn to_doubles<'a>(
+    fields: &'a [FieldRow],
+    words: &'a [u64],
+) -> impl Iterator<Item = f64> + 'a {
+    let numbers = fields.iter().flat_map(|f| std::iter::repeat_n(f.number, f.components as usize));
+    numbers.zip(words).map(|(number, &word)| number.unpack(word).to_f64())
 }

@@ -7,15 +7,17 @@
 //! never rounded.
 //!
 //! Reading order: [`export_with`], `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh), `numbering` (shared vertices),
-//! `faces` (the boundary), `output_files`, `stream` and `columns` (files), then one file or folder for each format.
+//! `faces` (the boundary), `output_files`, `stream`, `array_file` and `columns` (files), then one file or folder for each format.
 
 mod abaqus;
+mod array_file;
 mod columns;
 mod dispatch;
 mod doubles;
 mod embedded;
 mod embedded_list;
 mod error;
+mod exodus;
 mod faces;
 mod foam;
 mod format;
@@ -30,6 +32,8 @@ mod merged_parts;
 mod mfem;
 mod midpoints;
 mod names;
+mod nastran;
+mod netcdf;
 mod npy;
 mod npy_columns;
 mod numbering;
@@ -42,9 +46,11 @@ mod read_progress;
 mod report;
 mod scope;
 mod selection;
+mod sides;
 mod split;
 mod stream;
 mod su2;
+mod summary;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -52,6 +58,7 @@ mod tetgen;
 mod topology;
 mod vtk;
 mod writers;
+mod xdmf;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -63,6 +70,7 @@ use format::{
     FACES_ALONE, GHOSTS, PARTITIONS, REGIONS, REGIONS_APART, SECOND_ORDER, SLITS, STREAM,
     SUBDOMAINS, TEXT,
 };
+pub use merged_fields::fits_doubles;
 pub use npy::TextFile;
 pub use npy::bytes;
 pub use npy::{NpyField, NpyTable};

@@ -7,7 +7,14 @@ pub(super) fn quotable(name: &str) -> String {
     name.replace('"', "'").replace(['\n', '\r'], " ")
 }
 
-/// Names for Abaqus and OpenFOAM: letters, digits, `_` and `-`, a letter first, at most 80 characters, distinct without regard to case.
+/// Text in XML, without the characters that XML has not.
+pub(super) fn escaped(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('"', "&quot;");
+    let text = text.replace('<', "&lt;").replace('>', "&gt;");
+    text.replace(char::is_control, " ")
+}
+
+/// Names for Abaqus, Exodus and OpenFOAM: letters, digits, `_` and `-`, a letter first, at most 80 characters, distinct without regard to case.
 pub(super) fn set_names(labels: &BTreeMap<u32, String>) -> BTreeMap<u32, String> {
     let mut taken = BTreeSet::new();
     let mut names = BTreeMap::new();

@@ -84,7 +84,7 @@ pub(super) fn write(
     mesh.expect_passes(1, 1);
     let n_vertices = mesh.n_vertices();
     type VertexRow = (SealedVertex, Vec<u64>);
-    let [at_vertices, at_tets] = mesh.read_fields(false)?;
+    let [at_vertices, at_tets] = mesh.read_fields(false, false)?;
     let mut columns = vec![
         column("points", |row: &VertexRow| row.0.point),
         column("vertex_id", |row: &VertexRow| row.0.id as i64),

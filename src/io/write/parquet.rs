@@ -1,7 +1,7 @@
 //! Columns as Apache Parquet: for each sub-domain a file of tetrahedra and one of vertices.
 //!
 //! `NAME_00007.parquet` has a row for each tetrahedron, `NAME_00007_vertices.parquet` one for each vertex; `NAME.parquet` is not written. Rows are
-//! in the order of the store, along a Hilbert curve. Each group of rows has the least and greatest value of each column, so that programs read
+//! in the order of the store, along a Hilbert curve. A field has a column for each component, such as `u.x`. Each group of rows has the least and greatest value of each column, so that programs read
 //! only the groups of a box of space.
 
 use std::fs::OpenOptions;
@@ -15,26 +15,28 @@ use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
+use tetdb_schema::field::{FieldNumber, FieldPlace, FieldRow};
 use tetdb_schema::ids::TetId;
 
+use super::merged_fields::{FieldChunk, open_fields};
 use super::output_files::OutputFiles;
 use super::pieces::piece_path;
 use super::{ExportSelection, FileCounts, Result, WriteError};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::check_cancelled;
-use tetdb_store::sealed::{Shape, Subdomain};
+use tetdb_store::sealed::{FieldFile, Shape, Subdomain};
 use tetdb_store::store::Catalog;
 
 /// Rows of a group: few enough that a box of space meets few groups, enough for columns to compress well.
 const GROUP_ROWS: usize = 65_536;
 
-/// Ids are those of `tetdb query`: they last. `x y z` is the centroid.
+/// Ids are those of `tetdb query`: they last. `x y z` is the centroid. Columns of fields and the closing brace follow.
 const TETS: &str = "message tets { REQUIRED INT64 id; REQUIRED INT32 subdomain; REQUIRED INT32 region; \
     REQUIRED DOUBLE quality; REQUIRED DOUBLE volume; REQUIRED DOUBLE x; REQUIRED DOUBLE y; REQUIRED DOUBLE z; \
-    REQUIRED INT64 v0; REQUIRED INT64 v1; REQUIRED INT64 v2; REQUIRED INT64 v3; }";
+    REQUIRED INT64 v0; REQUIRED INT64 v1; REQUIRED INT64 v2; REQUIRED INT64 v3; ";
 /// `h` is the edge length wanted there. A vertex of an interface is in the file of each of its sub-domains.
 const VERTICES: &str = "message vertices { REQUIRED INT64 id; REQUIRED DOUBLE x; REQUIRED DOUBLE y; \
-    REQUIRED DOUBLE z; REQUIRED FLOAT h; REQUIRED INT32 tag; }";
+    REQUIRED DOUBLE z; REQUIRED FLOAT h; REQUIRED INT32 tag; ";
 
 /// A file under way.
 struct Table {
@@ -55,11 +57,26 @@ fn failed(path: &Path, error: ParquetError) -> WriteError {
 }
 
 impl Table {
-    fn create(outputs: &mut OutputFiles, out: &Path, schema: &str, bytes: u64) -> Result<Self> {
+    fn create(
+        outputs: &mut OutputFiles,
+        out: &Path,
+        (schema, fields): (&str, &[FieldRow]),
+        bytes: u64,
+    ) -> Result<Self> {
         let path = outputs.create(out, bytes)?;
         let file = OpenOptions::new().write(true).open(&path);
         let file = BufWriter::new(file.map_err(|e| WriteError::io(&path, e))?);
-        let schema = Arc::new(parse_message_type(schema).expect("the schemas are well formed"));
+        let columns = fields.iter().flat_map(|field| {
+            let kind = match field.number {
+                FieldNumber::F32 => "FLOAT",
+                FieldNumber::F64 => "DOUBLE",
+                FieldNumber::I32 => "INT32",
+                FieldNumber::I64 => "INT64",
+            };
+            field.columns().into_iter().map(move |name| format!("REQUIRED {kind} {name}; "))
+        });
+        let schema = format!("{schema}{}}}", columns.collect::<String>());
+        let schema = Arc::new(parse_message_type(&schema).expect("the schemas are well formed"));
         let packing = Compression::ZSTD(ZstdLevel::default());
         let properties = WriterProperties::builder()
             .set_compression(packing)
@@ -100,6 +117,46 @@ fn column<T: DataType>(
     column.close()
 }
 
+/// Words of the values of fields in a group of rows, a column for each component.
+struct FieldColumns(Vec<(FieldNumber, Vec<u64>)>);
+
+impl FieldColumns {
+    fn new(fields: &[FieldRow]) -> Self {
+        let columns = fields.iter().flat_map(|f| {
+            std::iter::repeat_with(|| (f.number, Vec::new())).take(f.components as usize)
+        });
+        Self(columns.collect())
+    }
+
+    /// Adds the values of the next row.
+    fn push(&mut self, words: &[u64]) {
+        self.0.iter_mut().zip(words).for_each(|((_, column), word)| column.push(*word));
+    }
+
+    /// Writes the columns of a group, and empties them.
+    fn write(&mut self, group: &mut Group) -> std::result::Result<(), ParquetError> {
+        for (number, words) in &mut self.0 {
+            let words = std::mem::take(words).into_iter();
+            match number {
+                FieldNumber::F32 => {
+                    let values: Vec<_> = words.map(|word| f32::from_bits(word as u32)).collect();
+                    column::<FloatType>(group, &values)?;
+                }
+                FieldNumber::F64 => {
+                    column::<DoubleType>(group, &words.map(f64::from_bits).collect::<Vec<_>>())?;
+                }
+                FieldNumber::I32 => {
+                    column::<Int32Type>(group, &words.map(|word| word as i32).collect::<Vec<_>>())?;
+                }
+                FieldNumber::I64 => {
+                    column::<Int64Type>(group, &words.map(|word| word as i64).collect::<Vec<_>>())?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
 pub(super) fn write(
     store: &mut Catalog,
     outputs: &mut OutputFiles,
@@ -111,27 +168,36 @@ pub(super) fn write(
     let mut rows = store.subdomains()?;
     rows.retain(|row| selection.writes_piece(row.rank));
     let all: u64 = rows.iter().map(|row| row.tets).sum();
+    let (at_vertices, at_tets): (Vec<_>, Vec<_>) =
+        store.fields()?.into_iter().partition(|field| field.place == FieldPlace::Vertices);
     let mut counts = FileCounts::default();
     for row in rows {
         let mut part = store.open_subdomain(row.rank, memory / 2)?;
         let piece = piece_path(out, row.rank, "parquet");
-        let mut table = Table::create(outputs, &piece, TETS, row.tets * 32)?;
+        let mut table = Table::create(outputs, &piece, (TETS, &at_tets), row.tets * 32)?;
         let mut tets = Tets::default();
+        let mut fields = FieldColumns::new(&at_tets);
+        let mut files = open_fields(store, &at_tets, &part)?;
         for chunk in 0..row.chunks[0] {
+            let n = tets.ids.len();
             tets.add(&mut part, chunk)?;
+            let values = FieldChunk::read(&mut files, chunk)?;
+            (0..tets.ids.len() - n).for_each(|i| fields.push(&values.row(i)));
             if tets.ids.len() >= GROUP_ROWS {
-                tets.write(&mut table, row.rank)?;
+                tets.write(&mut table, row.rank, &mut fields)?;
             }
             report(counts.tets + tets.done, all);
         }
-        tets.write(&mut table, row.rank)?;
+        tets.write(&mut table, row.rank, &mut fields)?;
         table.finish()?;
         counts.tets += row.tets;
         counts.vertices += row.vertices;
         let name = piece.file_stem().unwrap_or_default().to_string_lossy();
         let beside = piece.with_file_name(format!("{name}_vertices.parquet"));
-        let mut table = Table::create(outputs, &beside, VERTICES, row.vertices * 24)?;
-        vertices(&mut part, &mut table)?;
+        let schema = (VERTICES, &*at_vertices);
+        let mut table = Table::create(outputs, &beside, schema, row.vertices * 24)?;
+        let files = open_fields(store, &at_vertices, &part)?;
+        vertices(&mut part, &mut table, files, FieldColumns::new(&at_vertices))?;
         table.finish()?;
     }
     Ok(counts)
@@ -171,7 +237,7 @@ impl Tets {
         Ok(())
     }
 
-    fn write(&mut self, table: &mut Table, rank: u32) -> Result<()> {
+    fn write(&mut self, table: &mut Table, rank: u32, fields: &mut FieldColumns) -> Result<()> {
         if self.ids.is_empty() {
             return Ok(());
         }
@@ -186,7 +252,7 @@ impl Tets {
             for vertices in &self.vertices {
                 column::<Int64Type>(group, vertices)?;
             }
-            Ok(())
+            fields.write(group)
         })?;
         let done = self.done;
         *self = Self { done, ..Self::default() };
@@ -194,12 +260,19 @@ impl Tets {
     }
 }
 
-fn vertices(part: &mut Subdomain, table: &mut Table) -> Result<()> {
+fn vertices(
+    part: &mut Subdomain,
+    table: &mut Table,
+    mut files: Vec<FieldFile>,
+    mut fields: FieldColumns,
+) -> Result<()> {
     let (mut ids, mut h, mut tags) = (Vec::new(), Vec::new(), Vec::new());
     let mut points: [Vec<f64>; 3] = Default::default();
     let last = part.row().chunks[1];
     for (done, chunk) in (1..).zip(part.vertex_chunks()) {
-        for vertex in chunk?.records {
+        let values = FieldChunk::read(&mut files, done - 1)?;
+        for (i, vertex) in chunk?.records.into_iter().enumerate() {
+            fields.push(&values.row(i));
             ids.push(vertex.id as i64);
             for (column, x) in points.iter_mut().zip(vertex.point) {
                 column.push(x);
@@ -216,7 +289,8 @@ fn vertices(part: &mut Subdomain, table: &mut Table) -> Result<()> {
                 column::<DoubleType>(group, column_of)?;
             }
             column::<FloatType>(group, &h)?;
-            column::<Int32Type>(group, &tags)
+            column::<Int32Type>(group, &tags)?;
+            fields.write(group)
         })?;
         ids.clear();
         h.clear();

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use super::columns::Number;
 use super::dispatch;
 use super::merged::Merged;
+use super::names::escaped;
 use super::output_files::OutputFiles;
 use super::read_progress::ReadProgress;
 use super::scope::{FaceSet, Scope};
@@ -122,8 +123,7 @@ fn head(
     stream.text("    <PPoints>\n      <PDataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"/>\n    </PPoints>\n");
     for piece in pieces {
         let name = piece.file_name().unwrap_or_default().to_string_lossy();
-        let name = name.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;");
-        stream.text(&format!("    <Piece Source=\"{name}\"/>\n"));
+        stream.text(&format!("    <Piece Source=\"{}\"/>\n", escaped(&name)));
         stream.end()?;
     }
     stream.text("  </PUnstructuredGrid>\n</VTKFile>\n");

@@ -58,6 +58,14 @@ impl Stream {
         self.buffer.push(after);
     }
 
+    /// A number in decimal and spaces, together `width` bytes.
+    pub fn integer_padded(&mut self, value: u64, width: usize) {
+        let text = self.integers.format(value);
+        self.buffer.extend_from_slice(text.as_bytes());
+        let end = self.buffer.len() + width.saturating_sub(text.len());
+        self.buffer.resize(end, b' ');
+    }
+
     /// Numbers in decimal, `between` them one byte and `after` them another.
     pub fn integers(&mut self, values: impl IntoIterator<Item = u64>, between: u8, after: u8) {
         values.into_iter().for_each(|value| self.integer(value, between));

@@ -29,7 +29,7 @@ sort_record! {
 
 /// Writes the file; returns the number of faces in it.
 pub(super) fn write(mesh: &mut Merged, outputs: &mut OutputFiles, out: &Path) -> Result<u64> {
-    mesh.check_limits(out, i32::MAX as u64)?;
+    mesh.check_limits(out, i32::MAX as u64, 0)?;
     mesh.expect_passes(1, 1);
     let digits = u64::from(mesh.n_vertices().max(1).ilog10()) + 2;
     let bytes = (60 + digits) * mesh.n_vertices() + 5 * digits * mesh.n_tets();

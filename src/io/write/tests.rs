@@ -332,6 +332,39 @@ fn two_subdomains_become_one_mesh_in_every_format() -> Outcome {
 }
 
 #[test]
+fn the_cards_of_nastran_and_the_names_of_exodus_are_in_place() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("two.tetdb");
+    two_subdomains(&path)?;
+    let mut store = Catalog::open(&path)?;
+    let mut written = |name: &str| -> Outcome<Vec<u8>> {
+        let out = dir.path().join(name);
+        export(&mut store, &out, &ExportSelection::default(), 1 << 20, &quiet)?;
+        Ok(std::fs::read(out)?)
+    };
+    let deck = String::from_utf8(written("a.bdf")?)?;
+    let n_cards = |card: &str| deck.lines().filter(|line| line.starts_with(card)).count();
+    let cards =
+        ["GRID*   ", "*       ", "CTETRA  ", "CTRIA3  ", "PSOLID  ", "PSHELL  ", "$ digest "];
+    assert_eq!(cards.map(n_cards), [5, 5, 2, 6, 1, 1, 1]);
+    assert!(deck.lines().all(|line| line.len() <= 80), "{deck}");
+    assert!(deck.contains("GRID*   1                               0."), "{deck}");
+    assert!(
+        deck.contains("\nCTRIA3  3       2       "),
+        "triangles follow, with the label's property: {deck}"
+    );
+    let exodus = written("a.exo")?;
+    assert!(exodus.starts_with(b"CDF\x02"));
+    let has = |text: &[u8]| exodus.windows(text.len()).any(|window| window == text);
+    for text in ["eb_names", "ss_names", "connect1", "elem_ss1", "vals_elem_var2eb1", "digest "] {
+        assert!(has(text.as_bytes()), "{text}");
+    }
+    assert!(has(b"label_0\0\0") && has(b"region_1\0\0") && has(b"quality\0\0"));
+    assert_eq!(exodus.len() % 4, 0);
+    Ok(())
+}
+
+#[test]
 fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     let dir = tempfile::tempdir()?;
     let (n, path) = (6, dir.path().join("cubes.tetdb"));
@@ -430,7 +463,10 @@ fn files_do_not_depend_on_the_memory() -> Outcome {
     let path = dir.path().join("cubes.tetdb");
     cubes(&path, 20)?;
     let mut store = Catalog::open(&path)?;
-    let names = ["m.vtu", "m.meshb", "m.inp", "m.vtkhdf", "m.msh", "m.foam", "m.mfem", "m.su2"];
+    let names = [
+        "m.vtu", "m.meshb", "m.inp", "m.vtkhdf", "m.msh", "m.foam", "m.mfem", "m.su2", "m.exo",
+        "m.xdmf", "m.bdf",
+    ];
     for (name, pieces) in names.iter().flat_map(|n| [(n, false), (n, true)]) {
         let selection = ExportSelection { pieces, ..ExportSelection::default() };
         let mut files = Vec::new();
@@ -590,7 +626,8 @@ fn progress_ends_at_its_total() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("two.tetdb");
     two_subdomains(&path)?;
-    for name in ["p.vtu", "p.msh", "p.foam", "p.ele", "p.mfem", "p.su2"] {
+    for name in ["p.vtu", "p.msh", "p.foam", "p.ele", "p.mfem", "p.su2", "p.exo", "p.xdmf", "p.bdf"]
+    {
         let progress = std::cell::RefCell::new(Vec::new());
         let report = |done, total| progress.borrow_mut().push((done, total));
         export(

@@ -34,7 +34,7 @@ pub(super) fn write(
     selection: &ExportSelection,
 ) -> Result<FileCounts> {
     // Every tetrahedron has fewer than four faces to itself, and labels have 31 bits.
-    mesh.check_limits(out, i32::MAX as u64 / 4)?;
+    mesh.check_limits(out, i32::MAX as u64 / 4, 0)?;
     let case = out.parent().map(Path::to_owned).unwrap_or_default();
     let ascii = selection.ascii;
     let mut walk = FaceWalk::new(mesh)?;

@@ -44,11 +44,7 @@ impl Entities {
             bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             ranks: parts.iter().map(|part| part.rank).collect(),
             n_labels: mesh.n_labels(),
-            sets: mesh
-                .labels()
-                .into_keys()
-                .map(|label| (label, mesh.label_members(label)))
-                .collect(),
+            sets: mesh.members(),
             embedded: WrittenEmbedded::default(),
         };
         if piece.which.len() == parts.len() {

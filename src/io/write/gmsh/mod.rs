@@ -12,6 +12,7 @@ mod ghosts;
 mod nodes;
 mod out;
 mod piece;
+mod values;
 
 use std::path::{Path, PathBuf};
 
@@ -27,6 +28,7 @@ pub(super) use entities::physical_names;
 use ghosts::Ghosts;
 use out::Out;
 use piece::GmshPiece;
+use tetdb_schema::field::FieldRow;
 
 /// Writes one file of the whole mesh, or one of each partition.
 pub(super) fn write(
@@ -36,6 +38,11 @@ pub(super) fn write(
     (selection, midpoints, periodic): (&ExportSelection, Option<&Midpoints>, &WrittenPeriodic),
 ) -> Result<FileCounts> {
     mesh.expect_passes(1, 1);
+    let fields = mesh.read_fields(midpoints.is_some(), true)?.concat();
+    if !fields.is_empty() {
+        // The tags beside values have 32 bits.
+        mesh.check_limits(out, i32::MAX as u64, midpoints.map_or(0, Midpoints::n))?;
+    }
     let ghosts = match selection.ghosts {
         true => Some(Ghosts::gather(mesh)?),
         false => None,
@@ -45,15 +52,16 @@ pub(super) fn write(
     if !selection.pieces {
         let all: Vec<usize> = (0..mesh.n_parts()).collect();
         let piece = GmshPiece { which: &all, midpoints, foreign };
-        return write_file(mesh, outputs, out, &piece, (selection.ascii, ghosts, periodic));
+        let content = (selection.ascii, ghosts, periodic, &*fields);
+        return write_file(mesh, outputs, out, &piece, content);
     }
     let mut counts = FileCounts::default();
     for (p, part) in mesh.parts().into_iter().enumerate() {
         if selection.writes_piece(part.rank) {
             let path = piece_path(out, part.rank);
             let piece = GmshPiece { which: &[p], midpoints, foreign };
-            counts +=
-                write_file(mesh, outputs, &path, &piece, (selection.ascii, ghosts, periodic))?;
+            let content = (selection.ascii, ghosts, periodic, &*fields);
+            counts += write_file(mesh, outputs, &path, &piece, content)?;
         }
     }
     Ok(counts)
@@ -71,7 +79,7 @@ fn write_file(
     outputs: &mut OutputFiles,
     path: &Path,
     piece: &GmshPiece,
-    (ascii, ghosts, periodic): (bool, Option<&Ghosts>, &WrittenPeriodic),
+    (ascii, ghosts, periodic, fields): (bool, Option<&Ghosts>, &WrittenPeriodic, &[FieldRow]),
 ) -> Result<FileCounts> {
     let entities = Entities::gather(mesh, piece)?;
     let n_tets = entities.n_tets();
@@ -108,6 +116,7 @@ fn write_file(
     if let Some(ghosts) = ghosts {
         out.section("GhostElements", |out| ghosts.write(out, piece.which, mesh))?;
     }
+    values::write(mesh, &mut out, piece, fields)?;
     out.finish()?;
     Ok(FileCounts { vertices: nodes.n, tets: n_tets, triangles: entities.n_faces() })
 }

@@ -29,7 +29,7 @@ pub(super) fn write(
     out: &Path,
     selection: &ExportSelection,
 ) -> Result<FileCounts> {
-    mesh.check_limits(out, i32::MAX as u64)?;
+    mesh.check_limits(out, i32::MAX as u64, 0)?;
     mesh.expect_passes(1, 1);
     let sets = [region_sets(mesh)?, label_sets(mesh)];
     if !selection.pieces {

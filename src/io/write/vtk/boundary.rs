@@ -4,10 +4,11 @@
 //! the face for both. The vertices are those of the faces, in the order of the mesh; `mesh_vertex` is the place of each in the file of the
 //! tetrahedra. Label names are in the field array `label_names`.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::grid::{Container, GridWriter, VtkGrid};
-use crate::write::columns::column;
+use super::grid::{Container, GridWriter, VtkCells, VtkGrid};
+use crate::write::columns::{TableColumn, column};
 use crate::write::error::Result;
 use crate::write::faces::MergedFace;
 use crate::write::merged::Merged;
@@ -62,10 +63,19 @@ pub(super) fn partitions(mesh: &Merged, midpoints: Option<&Midpoints>) -> Vec<Pa
 }
 
 /// The lasting id of a point that has none: the midpoint of an edge.
-pub(super) const NO_ID: i64 = -1;
+pub(in crate::write) const NO_ID: i64 = -1;
 
 /// Most groups that get a flag for each face. A byte for each is half of a face's bytes then, and the file would be mostly zeros.
 const GROUPS_MAX: usize = 64;
+
+/// Columns of the groups, 1 where a face is in one, if any face is in two.
+pub(in crate::write) fn group_columns(mesh: &Merged) -> Vec<TableColumn<MergedFace>> {
+    let groups = mesh.overlapping_groups().into_iter().take(GROUPS_MAX);
+    let is_in = |(name, labels): (String, BTreeSet<u32>)| {
+        column(name, move |face: &MergedFace| u8::from(labels.contains(&face.label)))
+    };
+    groups.map(is_in).collect()
+}
 
 /// A point of the file: its place in the file of the tetrahedra, and its lasting id or -1.
 type PointRow = (u64, i64);
@@ -75,16 +85,16 @@ pub(in crate::write) fn write(
     mesh: &mut Merged,
     outputs: &mut OutputFiles,
     out: &Path,
-    is_hdf: bool,
+    hdf: Option<VtkCells>,
     midpoints: Option<&Midpoints>,
 ) -> Result<u64> {
     let n_corners = if midpoints.is_some() { 6 } else { 3 };
     let used = mesh.dir().join("corners");
     let (n_vertices, mut nodes) = dense_corners(mesh, &used, midpoints)?;
     let n_faces = mesh.n_faces();
-    let container = match is_hdf {
-        true => Container::Hdf(vec![[n_vertices, n_faces]]),
-        false => Container::Xml,
+    let container = match hdf {
+        Some(cells) => Container::Hdf(cells, vec![[n_vertices, n_faces]]),
+        None => Container::Xml,
     };
     let points = vec![
         column("mesh_vertex", |point: &PointRow| point.0 as i64),
@@ -101,9 +111,7 @@ pub(in crate::write) fn write(
         column("cut", move |face: &MergedFace| or_none(cut_of(face))),
         column("cut_face", |face: &MergedFace| or_none(face.cut().map(|(_, index)| index))),
     ];
-    for (name, labels) in mesh.overlapping_groups().into_iter().take(GROUPS_MAX) {
-        faces.push(column(name, move |face: &MergedFace| u8::from(labels.contains(&face.label))));
-    }
+    faces.extend(group_columns(mesh));
     let counts = [n_vertices, n_faces, n_corners];
     let texts = ("label_names", &*label_names(mesh));
     let grid = VtkGrid::new(&container, counts, texts, points, faces);

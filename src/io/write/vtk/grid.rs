@@ -51,13 +51,22 @@ impl Array {
     }
 }
 
+/// VTK's kinds of cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::write) enum VtkCells {
+    /// Those of first or second order.
+    OfOrder,
+    /// Lagrange's, of any order: the only ones that DOLFINx 0.10 reads.
+    Lagrange,
+}
+
 /// How a VTK file holds its arrays.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Container {
     /// `.vtu`: one mesh.
     Xml,
     /// `.vtkhdf`: partitions with points of their own. Shape: points and cells of each.
-    Hdf(Vec<[u64; 2]>),
+    Hdf(VtkCells, Vec<[u64; 2]>),
 }
 
 /// An array of the field data and its texts: UTF-8 with a zero after each, because not every program reads arrays of text.
@@ -78,6 +87,8 @@ pub(super) struct VtkGrid<P, C> {
     /// Points, cells and partitions.
     rows: [u64; 3],
     corners: u64,
+    /// VTK's number of the kind of cells.
+    kind: u8,
     layout: Layout,
     /// Bytes that each array has for each point, cell and partition.
     bytes_per: Vec<[u64; 3]>,
@@ -121,10 +132,14 @@ impl<P, C> VtkGrid<P, C> {
         let bytes_per: Vec<_> = arrays.iter().map(|a| a.bytes_per(corners, is_hdf)).collect();
         let (layout, n_partitions) = match container {
             Container::Xml => (Layout::xml(&arrays, &bytes_per, counts, texts), 1),
-            Container::Hdf(parts) => (Layout::hdf(parts, &arrays, counts, texts), parts.len()),
+            Container::Hdf(_, parts) => (Layout::hdf(parts, &arrays, counts, texts), parts.len()),
+        };
+        let kind = match container {
+            Container::Xml => cell_type(VtkCells::OfOrder, corners),
+            Container::Hdf(cells, _) => cell_type(*cells, corners),
         };
         let rows = [n_points, n_cells, n_partitions as u64];
-        Self { points, cells, is_narrow, is_hdf, rows, corners, layout, bytes_per }
+        Self { points, cells, is_narrow, is_hdf, rows, corners, kind, layout, bytes_per }
     }
 
     /// Length of the whole file.
@@ -210,7 +225,7 @@ impl<P, C> GridWriter<'_, P, C> {
         }
         self.end += self.grid.corners;
         put_index(&mut self.ends, self.end, is_narrow)?;
-        self.types.put(&[cell_type(self.grid.corners)])
+        self.types.put(&[self.grid.kind])
     }
 
     /// Ends the arrays, which must be full. Errors: the disk.
@@ -230,8 +245,10 @@ fn put_index(strip: &mut Strip, value: u64, is_narrow: bool) -> Result<()> {
 }
 
 /// VTK's number of a triangle or tetrahedron, alone or with the midpoints of its edges.
-fn cell_type(corners: u64) -> u8 {
+fn cell_type(cells: VtkCells, corners: u64) -> u8 {
     match corners {
+        3 | 6 if cells == VtkCells::Lagrange => 69,
+        4 | 10 if cells == VtkCells::Lagrange => 71,
         3 => 5,
         6 => 22,
         4 => 10,

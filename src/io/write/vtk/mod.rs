@@ -18,9 +18,10 @@ use super::midpoints::Midpoints;
 use super::output_files::OutputFiles;
 use super::selection::Share;
 use super::writers::Writers;
-pub(super) use boundary::write as write_boundary;
-use boundary::{NO_ID, Partition, partitions};
+pub(super) use boundary::{NO_ID, group_columns, write as write_boundary};
+use boundary::{Partition, partitions};
 pub use defects::defects;
+pub(super) use grid::VtkCells;
 use grid::{Container, VtkGrid};
 pub use selected::{SelectedTet, SelectedVtu};
 use tetdb_base::storage::RemoteFailure;
@@ -52,25 +53,27 @@ pub(super) fn tet_columns(fields: &[FieldRow]) -> Vec<TableColumn<MergedTet>> {
 /// A grid, and the fields at its vertices.
 type TetGrid = (VtkGrid<VertexRow, MergedTet>, Vec<FieldRow>);
 
-/// Writes both files. Several processes may write partitions of a `.vtkhdf`, whose mesh numbers the vertices of each sub-domain apart.
+/// Writes both files, XML or `hdf` with these kinds of cells. Several processes may write partitions of a `.vtkhdf`, whose mesh numbers the vertices of each sub-domain apart.
 pub(super) fn write(
     mesh: &mut Merged,
     outputs: &mut OutputFiles,
     out: &Path,
-    is_hdf: bool,
+    hdf: Option<VtkCells>,
     midpoints: Option<&Midpoints>,
     writers: Option<&dyn Writers>,
 ) -> Result<()> {
     mesh.expect_passes(2, 1);
     let partitions = partitions(mesh, midpoints);
-    let container = match is_hdf {
-        true => Container::Hdf(partitions.iter().map(|p| [p.n_points(), p.n_tets]).collect()),
-        false => Container::Xml,
+    let container = match hdf {
+        Some(cells) => {
+            Container::Hdf(cells, partitions.iter().map(|p| [p.n_points(), p.n_tets]).collect())
+        }
+        None => Container::Xml,
     };
     let [n_points, n_tets, _] = rows(&partitions);
     let counts = [n_points, n_tets, if midpoints.is_some() { 10 } else { 4 }];
     let texts = ("region_names", &*mesh.region_names());
-    let [at_vertices, at_tets] = mesh.read_fields(midpoints.is_some())?;
+    let [at_vertices, at_tets] = mesh.read_fields(midpoints.is_some(), false)?;
     let columns = (vertex_columns(&at_vertices), tet_columns(&at_tets));
     let grid = VtkGrid::new(&container, counts, texts, columns.0, columns.1);
     let grid = (grid, at_vertices);
@@ -82,7 +85,7 @@ pub(super) fn write(
     let Some(writers) = writers else {
         let path = begin()?;
         write_partitions(mesh, (&grid, &path), &partitions, 0..n, midpoints)?;
-        return write_boundary(mesh, outputs, &boundary_path(out), is_hdf, midpoints).map(drop);
+        return write_boundary(mesh, outputs, &boundary_path(out), hdf, midpoints).map(drop);
     };
     let Share { number, of } = writers.share();
     let write_own = |mesh: &mut Merged, path: &Path| -> Result<()> {
@@ -96,7 +99,7 @@ pub(super) fn write(
         let path = begin().inspect(|path| writers.announce(path))?;
         write_own(mesh, &path)?;
         mesh.look_at(0..n);
-        write_boundary(mesh, outputs, &boundary_path(out), true, None)?;
+        write_boundary(mesh, outputs, &boundary_path(out), hdf, None)?;
         return writers.wait().map_err(WriteError::Elsewhere);
     }
     let Some(path) = writers.hear() else {
@@ -165,7 +168,7 @@ fn write_partitions(
 }
 
 /// `NAME_boundary.vtu` beside `NAME.vtu`.
-fn boundary_path(out: &Path) -> PathBuf {
+pub(super) fn boundary_path(out: &Path) -> PathBuf {
     let mut name = out.file_stem().unwrap_or_default().to_owned();
     name.push("_boundary.");
     name.push(out.extension().unwrap_or_default());

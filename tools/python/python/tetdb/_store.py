@@ -565,8 +565,8 @@ class Store:
     ) -> list[str]:
         """Writes the mesh for another program, in the format that the ending says, as ``tetdb export`` does.
 
-        ``.vtu``, ``.pvtu``, ``.vtkhdf``, ``.foam`` (OpenFOAM), ``.msh``, ``.mesh``, ``.meshb``, ``.mfem``, ``.inp``, ``.su2``, ``.ele``, ``.npy``,
-        ``.json``; the guide says which can do what. ``.mesh``, ``.meshb``, ``.ele`` and ``.npy`` have numbers in place of the names in
+        ``.vtu``, ``.pvtu``, ``.vtkhdf``, ``.xdmf``, ``.exo`` (Exodus II), ``.foam`` (OpenFOAM), ``.msh``, ``.mesh``, ``.meshb``, ``.mfem``,
+        ``.inp``, ``.bdf`` (Nastran), ``.su2``, ``.ele``, ``.npy``, ``.json``; the guide says which can do what. ``.mesh``, ``.meshb``, ``.ele`` and ``.npy`` have numbers in place of the names in
         :attr:`labels`; what a format has no place for, is in files beside it.
 
         Parameters
