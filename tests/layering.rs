@@ -61,7 +61,6 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "chains, faces and suppression of one attempt, which hand on four lists",
     ),
     ("cli/estimate.rs run", "an answer line by line, for people and for programs"),
-    ("engine/pipeline/mesh/run.rs coarse_step", "one step of the recipe and its commit"),
     ("engine/pipeline/remesh/run.rs commit", "one commit: what it checks and all that it writes"),
     (
         "engine/pipeline/tasks/serve.rs serve",

@@ -105,6 +105,27 @@ pub fn mesh_prepared(
     go_on(catalog, surface, options, &prepared.field, Some(new), budget, watch)
 }
 
+/// Row of the journal for the coarse mesh; called on its thread.
+fn coarse_row(
+    report: &CoarseReport,
+    [n_triangles, predicted, head_start]: [f64; 3],
+    (pages, frames_used): (PagerStats, usize),
+    clock: &StepClock,
+) -> JournalRow {
+    let measures = [
+        ("missing_segments", f64::from(report.recovery.missing_segments)),
+        ("missing_facets", f64::from(report.recovery.missing_facets)),
+        (INPUT_TRIANGLES, n_triangles),
+        ("predicted_tets", predicted),
+        ("head_start_s", head_start),
+        ("pages_read", pages.pages_read as f64),
+        ("pages_written", pages.pages_written as f64),
+        ("frames_used", frames_used as f64),
+    ];
+    let measures: Vec<_> = measures.into_iter().chain(by_threads(clock)).collect();
+    journal(StoreState::Coarse, "coarse mesh", clock.begun(), &measures)
+}
+
 /// Input of the first step: sizes, estimate and head start of a mesh that is not begun.
 struct New {
     sizes: SizeSummary,
@@ -274,6 +295,8 @@ impl<'a> Run<'a> {
         };
         let (pages, frames_used) = (mesh.pages().stats(), mesh.pages().frames_used());
         let (field, bounds) = (self.field.to_bytes(), self.bounds);
+        let counts = [n_triangles as f64, predicted, head_start];
+        let row = coarse_row(&report, counts, (pages, frames_used), &clock);
         self.catalog.commit(|step| {
             step.list_file(0, COARSE);
             step.set_labels(&label_names);
@@ -296,24 +319,7 @@ impl<'a> Run<'a> {
             if let Some(row) = prepared {
                 step.append_journal(row);
             }
-            step.append_journal(&journal(
-                StoreState::Coarse,
-                "coarse mesh",
-                clock.begun(),
-                &[
-                    ("missing_segments", f64::from(report.recovery.missing_segments)),
-                    ("missing_facets", f64::from(report.recovery.missing_facets)),
-                    (INPUT_TRIANGLES, n_triangles as f64),
-                    ("predicted_tets", predicted),
-                    ("head_start_s", head_start),
-                    ("pages_read", pages.pages_read as f64),
-                    ("pages_written", pages.pages_written as f64),
-                    ("frames_used", frames_used as f64),
-                ]
-                .into_iter()
-                .chain(by_threads(&clock))
-                .collect::<Vec<_>>(),
-            ));
+            step.append_journal(&row);
             Ok(())
         })?;
         Ok((mesh, report))
