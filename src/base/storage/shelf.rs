@@ -48,6 +48,13 @@ struct ShelfPlace<T> {
     stored: Option<Arc<FilePart>>,
 }
 
+/// An object that is to be written before it leaves memory.
+struct Leaving<T> {
+    number: u32,
+    object: Arc<T>,
+    file: Arc<ScratchFile>,
+}
+
 /// First unit and bytes.
 #[derive(Clone, Copy)]
 struct FilePart {
@@ -171,12 +178,9 @@ impl<T: Shelved> Shelf<T> {
     fn keep_limit(&self) {
         let mut buffer = Vec::new();
         loop {
-            let (number, object, file) = {
-                let mut inner = self.lock();
-                let Some(next) = inner.next_to_write().unwrap_or_else(|e| raise(e)) else {
-                    return;
-                };
-                next
+            let next = self.lock().next_to_write().unwrap_or_else(|e| raise(e));
+            let Some(Leaving { number, object, file }) = next else {
+                return;
             };
             buffer.clear();
             object.write(&mut buffer);
@@ -223,7 +227,7 @@ impl<T: Shelved> Inner<T> {
     }
 
     /// The object used longest ago, if it has to leave memory and is not in the file. Those that are in the file leave at once.
-    fn next_to_write(&mut self) -> Result<Option<(u32, Arc<T>, Arc<ScratchFile>)>, StorageError> {
+    fn next_to_write(&mut self) -> Result<Option<Leaving<T>>, StorageError> {
         while self.is_over() {
             let Some((number, ())) = self.order.pop_lru() else {
                 break;
@@ -239,8 +243,8 @@ impl<T: Shelved> Inner<T> {
                 let dir = self.dir.as_ref().expect("only then anything leaves");
                 self.file = Some(Arc::new(ScratchFile::create(dir)?));
             }
-            let file = self.file.as_ref().expect("it is there now");
-            return Ok(Some((number, object, Arc::clone(file))));
+            let file = Arc::clone(self.file.as_ref().expect("it is there now"));
+            return Ok(Some(Leaving { number, object, file }));
         }
         Ok(None)
     }

@@ -78,6 +78,19 @@ pub(super) fn write(
         MeshFormat::TetGen => tetgen::write(mesh, outputs, out)?,
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }
+    let is_mesh = selection.content == Content::Mesh;
+    write_beside(mesh, outputs, out, (format, is_mesh, &periodic))?;
+    mesh.report_end();
+    Ok(counts)
+}
+
+/// Writes lists of what the format has no place for: embedded edges and points, periodic pairs.
+fn write_beside(
+    mesh: &mut Merged,
+    outputs: &mut OutputFiles,
+    out: &Path,
+    (format, is_mesh, periodic): (MeshFormat, bool, &WrittenPeriodic),
+) -> Result<()> {
     let has_lines = matches!(
         format,
         MeshFormat::Medit
@@ -89,12 +102,11 @@ pub(super) fn write(
     );
     // TetGen's files have edges and no points.
     let lacks_points = format == MeshFormat::TetGen && !mesh.embedded().points.is_empty();
-    if (!has_lines || lacks_points) && selection.content == Content::Mesh {
+    if (!has_lines || lacks_points) && is_mesh {
         write_list(mesh, outputs, out)?;
     }
     if !matches!(format, MeshFormat::Gmsh | MeshFormat::Numpy) {
         periodic.write_list(mesh, outputs, out)?;
     }
-    mesh.report_end();
-    Ok(counts)
+    Ok(())
 }
