@@ -1,8 +1,13 @@
-"""Reads a store in ParaView without a window: `pvbatch check.py STORE`. Fails unless all is as `tetdb` says."""
+"""Reads a store in ParaView without a window: `pvbatch check.py STORE`. Fails unless all is as `tetdb` says.
+
+`pvbatch check.py STORE RANK` reads one sub-domain alone, and says what that takes in seconds and MiB.
+"""
 
 import inspect
 import os
+import resource
 import sys
+import time
 
 import numpy as np
 import tetdb
@@ -19,6 +24,19 @@ LoadPlugin(os.path.join(os.path.dirname(os.path.abspath(__file__)), "tetdb_reade
 path = sys.argv[1]
 with tetdb.open(path) as store:
     parts = {str(part.rank): part.n_tets for part in store.subdomains}
+if len(sys.argv) > 2:
+    rank, before = sys.argv[2], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.perf_counter()
+    reader = TetdbStore(FileName=path)  # noqa: F821
+    reader.UpdatePipelineInformation()
+    reader.Subdomains = [rank]
+    UpdatePipeline(proxy=reader)
+    found, seconds = reader.GetDataInformation().GetNumberOfCells(), time.perf_counter() - start
+    assert found == parts[rank], (rank, found)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(f"sub-domain {rank} of {len(parts)}, {found} of {sum(parts.values())} tetrahedra: {seconds:.2f} s, {peak / 1024:.0f} MiB at most, {before / 1024:.0f} before")
+    sys.exit()
+with tetdb.open(path) as store:
     quality = np.concatenate([store.subdomain(int(rank)).quality for rank in parts])
 
 for file in (path, os.path.join(path, "catalog.redb")):
