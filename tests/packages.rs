@@ -28,14 +28,20 @@ fn line<'a>(text: &'a str, key: &str) -> &'a str {
     value.unwrap_or_else(|| panic!("no line `{key}`")).trim().trim_matches('"')
 }
 
+/// Folders of the crates that are published.
+fn published() -> Vec<PathBuf> {
+    let folders = fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).expect("src");
+    let folders = folders.map(|entry| entry.expect("an entry").path());
+    let mut all: Vec<PathBuf> = folders.filter(|path| path.join("Cargo.toml").exists()).collect();
+    assert_eq!(all.len(), 7, "{all:?}");
+    all.extend(["", "schema"].map(PathBuf::from));
+    all
+}
+
 #[test]
 fn published_crates_are_described() {
-    let folders = fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).expect("src");
-    let crates = folders.map(|entry| entry.expect("an entry").path().join("Cargo.toml"));
-    let crates: Vec<PathBuf> = crates.filter(|path| path.exists()).collect();
-    assert_eq!(crates.len(), 7, "{crates:?}");
-    let root = ["Cargo.toml", "schema/Cargo.toml"].map(PathBuf::from);
-    for path in crates.iter().chain(&root) {
+    for folder in published() {
+        let path = folder.join("Cargo.toml");
         let path = path.to_str().expect("a name in ASCII");
         let package = table(path)["package"].clone();
         let words = ["description", "license", "repository", "homepage", "documentation", "readme"];
@@ -48,6 +54,18 @@ fn published_crates_are_described() {
         .map(|folder| format!("{folder}/Cargo.toml"))
     {
         assert_eq!(table(&path)["package"].get("publish"), Some(&Value::Boolean(false)), "{path}");
+    }
+}
+
+/// The texts lie at the top; each package has links to them, which `cargo package` and maturin replace by the texts.
+#[test]
+fn every_package_has_the_licences() {
+    for folder in published().into_iter().chain(["tools/python".into()]) {
+        for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
+            let path = folder.join(name);
+            let path = path.to_str().expect("a name in ASCII");
+            assert!(read(path) == read(name), "{path} is not {name} of the sources");
+        }
     }
 }
 

@@ -40,8 +40,8 @@ cp README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$files/$name/"
 "$program" mesh sample:box,h=0.5 -o "$files/box.tetdb" --quiet
 "$program" verify "$files/box.tetdb" --full | tail -1
 
-# The program lies at the top of the archive, where `cargo binstall` looks for it.
-tar -c -z -f "$out/$name.tar.gz" -C "$files/$name" .
+# The program lies at the top of the archive, where `cargo binstall` looks for it, by a name without `./`.
+(cd "$files/$name" && tar -c -z -f "$out/$name.tar.gz" -- *)
 (cd "$out" && { sha256sum "$name.tar.gz" 2>/dev/null || shasum -a 256 "$name.tar.gz"; } >"$name.tar.gz.sha256")
 
 if [ -n "$(command -v cargo-deb)" ] && [ "${target%gnu}" != "$target" ]; then

@@ -19,7 +19,7 @@ SIZE = "--size 1200x900"
 PICTURES = [
     ("Many bodies", "Forty empty balls in a cube. Every triangle of their surfaces is a face of the mesh.", "balls",
      ["mesh sample:balls,count=40,seed=5 -o balls.tetdb", "snapshot balls.tetdb balls.png --surface --plane 0.5,0.5,0.5,1,0.2,0.3 --from 1,0.5,0.4"]),
-    ("A cut through many millions", "Sub-domains of a mesh that need not fit in memory. The cut reads only what its plane meets.", "large",
+    ("A cut through a large mesh", "Sub-domains of a mesh that need not fit in memory. The cut reads only what its plane meets.", "large",
      ["mesh sample:balls,count=300,h={h} -o large.tetdb --memory 1GiB --subdomains 16 --no-verify", "snapshot large.tetdb large.png --plane 0.5,0.5,0.5,0,-1,0"]),
     ("Bodies and what is between them", "Balls, each a region of its own, and the region around them. Where materials meet, they share faces.", "inclusions",
      ["mesh sample:balls,count=60,seed=3 -o inclusions.tetdb --regions all", "snapshot inclusions.tetdb inclusions.png --surface --plane 0.5,0.5,0.5,1,0.3,0.2 --from 1,0.4,0.4 --color region"]),
@@ -66,7 +66,8 @@ def main(program: str, folder: str, h: str = "0.004") -> None:
             found = json.loads(run(f"info {name}.tetdb --json"))
             os.replace(Path(work) / f"{name}.png", source / "pictures" / f"gallery_{name}.png")
             count = f"{found['tets']:,} tetrahedra"
-            lines = "\n".join(f"$ tetdb {command}" for command in commands)
+            # An option a line, since a browser breaks lines behind hyphens.
+            lines = "\n".join(f"$ tetdb {command}".replace(" -", " \\\n    -") for command in commands)
             picture = f"![{title}](pictures/gallery_{name}.png)"
             parts.append(f'## {title}\n\n{text}\n\n<div class="shown">\n\n{picture}\n\n<div>\n\n{count}\n\n```console\n{lines}\n```\n\n</div>\n</div>\n')
     (source / "gallery.md").write_text("\n".join(parts))

@@ -38,9 +38,9 @@ pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 pub use transfer::TransferArgs;
 pub use version::{VersionAction, VersionArgs};
 
-/// Fills a closed triangle surface with tetrahedra.
+/// Fill closed triangle surfaces with tetrahedra, in stores on disk that can be larger than memory
 #[derive(Debug, Parser)]
-#[command(name = "tetdb", version, about, max_term_width = 110)]
+#[command(name = "tetdb", version, max_term_width = 110)]
 #[command(
     after_help = "`tetdb mesh` writes the mesh into a store, which is a directory; most other commands take a store and read it. \
     `tetdb resume` continues a run that was stopped. Every input triangle is kept. Generated surfaces such as sample:balls,count=100 stand \

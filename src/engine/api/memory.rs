@@ -61,13 +61,16 @@ pub fn default_cap() -> (u64, String) {
 
 /// Free bytes of the system, of the control group, or within the limits of the process, whichever is least.
 fn free() -> (u64, &'static str) {
-    let system = field("/proc/meminfo", "MemAvailable:").unwrap_or(UNKNOWN_FREE);
+    let system = match field("/proc/meminfo", "MemAvailable:") {
+        Some(bytes) => (Some(bytes), "free in this machine"),
+        None => (Some(UNKNOWN_FREE), "assumed to be free: the system does not report it"),
+    };
     let of_process = |limit, used| {
         let used = field("/proc/self/status", used)?;
         Some(limit_of(limit)?.saturating_sub(used + BESIDE_CAP))
     };
     let all = [
-        (Some(system), "free in this machine"),
+        system,
         (group_free(), "free in this control group"),
         (
             of_process("Max address space", "VmSize:"),
