@@ -39,14 +39,12 @@ pub(super) fn write(
         tets: mesh.n_tets(),
         triangles: mesh.n_faces(),
     };
-    let hdf = Some(match selection.one_partition {
-        true => vtk::VtkCells::Lagrange,
-        false => vtk::VtkCells::OfOrder,
-    });
+    let is_lagrange = selection.one_partition;
+    let cells = if is_lagrange { vtk::VtkCells::Lagrange } else { vtk::VtkCells::OfOrder };
+    let hdf = (format == MeshFormat::VtkHdf).then_some(cells);
     match format {
         MeshFormat::Vtu | MeshFormat::VtkHdf if selection.content != Content::Mesh => {
             mesh.expect_passes(1, 0);
-            let hdf = hdf.filter(|_| format == MeshFormat::VtkHdf);
             counts.vertices = vtk::write_boundary(mesh, outputs, out, hdf, midpoints)?;
             counts.tets = 0;
         }

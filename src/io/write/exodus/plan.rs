@@ -195,7 +195,9 @@ impl Plan {
         for (b, (&region, &n)) in (1..).zip(regions) {
             let elements = self.file.dimension(format!("num_el_in_blk{b}"), n);
             let nodes = self.file.dimension(format!("num_nod_per_el{b}"), n_nodes);
-            let kind = vec![("elem_type", NetcdfValue::Text(format!("TETRA{n_nodes}")))];
+            // Every reader knows `TETRA`, not every one `TETRA4`.
+            let kind = if n_nodes == 4 { "TETRA" } else { "TETRA10" };
+            let kind = vec![("elem_type", NetcdfValue::Text(kind.to_owned()))];
             let name = format!("connect{b}");
             let nodes = self.file.variable(name, NetcdfType::Int, &[elements, nodes], kind);
             let values = (1..=n_variables)
