@@ -325,8 +325,8 @@ fn exports_have_fields() {
     ] {
         place.run_line(&format!("field a.tetdb add {line}")).succeeds();
     }
-    let done = place.run_line("export a.tetdb m.npy m.vtu m.pvtu m.vtkhdf m.msh").succeeds();
-    assert!(done.stderr().contains("m.msh is written without T, u, mark"), "{}", done.stderr());
+    let done = place.run_line("export a.tetdb m.npy m.vtu m.pvtu m.vtkhdf m.su2").succeeds();
+    assert!(done.stderr().contains("m.su2 is written without T, u, mark"), "{}", done.stderr());
     assert_eq!(done.stderr().matches("is written without").count(), 1, "{}", done.stderr());
     let points = doubles(&place, "m_points.npy");
     let values = doubles(&place, "m_T.npy");
