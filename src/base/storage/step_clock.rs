@@ -88,7 +88,7 @@ impl StepClock {
         self.begun.elapsed().as_secs_f64()
     }
 
-    /// What was shared until now, asked on the thread of the step.
+    /// The seconds that threads have shared since the step began. Call it on the thread of the step.
     pub fn shared(&self) -> SharedSeconds {
         let (now, before) = (SHARED.get(), self.before);
         SharedSeconds {

@@ -18,7 +18,8 @@ pub(super) struct Graph {
     followers: Vec<Vec<u32>>,
     /// Tasks that each task waits for.
     n_before: Vec<u32>,
-    /// What is greater goes first: the longest chain that begins with the task, in units of load.
+    /// Of two tasks that are ready, the one with the greater number goes first. It is the longest chain that begins
+    /// with the task, in units of load.
     urgency: Vec<u64>,
 }
 

@@ -129,7 +129,7 @@ pub struct Prepared {
     pub estimate: Estimate,
     /// Notes on the regions for the user.
     pub notes: Vec<String>,
-    /// What preparing it took, for the journal.
+    /// The journal row of the checks and the size field: their seconds.
     pub journal: Option<JournalRow>,
 }
 
