@@ -153,7 +153,8 @@ fn spread(mesh: &mut Mesh<FlatPages>) -> Point {
     axis
 }
 
-fn papers_plane(surface: &Surface) -> (Mesh<FlatPages>, Plane) {
+/// The plane that divides the coarse mesh of a surface, with the wanted length `h` everywhere.
+fn plane_of(surface: &Surface, h: f64, choice: PlaneChoice) -> (Mesh<FlatPages>, Plane) {
     let mut mesh = Mesh::new(FlatPages::default());
     pipeline::coarse_mesh(
         &mut mesh,
@@ -164,11 +165,26 @@ fn papers_plane(surface: &Surface) -> (Mesh<FlatPages>, Plane) {
     )
     .expect("a mesh");
     for v in mesh.vertex_ids() {
-        mesh.set_size(v, 1.0);
+        mesh.set_size(v, h as f32);
     }
     let origin = surface.bounds().low;
-    let chosen = choose_plane(&mut mesh, &|_| 1.0, origin, 0.5, PlaneChoice::Centroids);
+    let chosen = choose_plane(&mut mesh, &|_| h, origin, 0.5, choice);
     (mesh, chosen.plane)
+}
+
+#[test]
+fn a_long_body_is_cut_across_however_coarse_it_is_and_however_it_lies() {
+    for h in ["0.3", "0.1", "0.05", "0.0333", "0.025"] {
+        for (length, turn) in [("1.25", 0.0), ("1.6", 0.0), ("1.6", 0.7), ("3", 0.2), ("3", 1.1)] {
+            let mut surface = sample(&format!("box,x={length},h={h}"));
+            let along = turned(Point::X, turn, 2.0 * turn);
+            surface.points.iter_mut().for_each(|p| *p = turned(*p, turn, 2.0 * turn));
+            let h: f64 = h.parse().expect("a number");
+            let (_, plane) = plane_of(&surface, h, PlaneChoice::Load);
+            let angle = plane.normal.cross(along).length();
+            assert!(angle < 0.15, "h = {h}, {length} long, turned by {turn}: {plane:?}");
+        }
+    }
 }
 
 #[test]
@@ -186,12 +202,12 @@ fn the_papers_plane_is_across_the_axis_of_inertia_and_turns_with_the_mesh() {
             let noise = Point::new(noise(0), noise(1), noise(2));
             *p = turned((*p + noise * 0.01) * stretch, 0.37 * f, 0.81 * f);
         }
-        let (mut mesh, plane) = papers_plane(&surface);
+        let (mut mesh, plane) = plane_of(&surface, 1.0, PlaneChoice::Centroids);
         let angle = plane.normal.cross(spread(&mut mesh)).length();
         assert!(angle < 1e-6, "mesh {k}: {angle}");
         let mut other = surface.clone();
         other.points.iter_mut().for_each(|p| *p = turned(*p, 0.5, -0.3));
-        let (_, again) = papers_plane(&other);
+        let (_, again) = plane_of(&other, 1.0, PlaneChoice::Centroids);
         let expected = turned(plane.normal, 0.5, -0.3);
         let angle = again.normal.cross(expected).length();
         assert!(angle < 1e-6, "mesh {k} turned: {angle}");

@@ -21,6 +21,18 @@ impl Moments {
         }
     }
 
+    /// Adds a body of even density in the shape of a tetrahedron: five points have its moments.
+    pub fn add_tet(&mut self, points: [Point; 4], weight: f64) {
+        self.add(points.iter().sum::<Point>() * 0.25, 0.8 * weight);
+        points.into_iter().for_each(|p| self.add(p, 0.05 * weight));
+    }
+
+    pub fn add_all(&mut self, other: &Self) {
+        self.weight += other.weight;
+        self.first += other.first;
+        self.second.iter_mut().zip(other.second).for_each(|(sum, more)| *sum += more);
+    }
+
     /// The matrix of central moments.
     pub fn matrix(&self) -> [[f64; 3]; 3] {
         let g = self.first / self.weight;
@@ -78,6 +90,29 @@ pub fn principal_axes(matrix: &[[f64; 3]; 3]) -> [Point; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_five_tetrahedra_of_a_box_have_its_moments() {
+        let corner =
+            |k: usize| Point::new((k & 1) as f64, (2 * (k >> 1 & 1)) as f64, (3 * (k >> 2)) as f64);
+        let mut moments = Moments::default();
+        for (tet, volume) in [
+            ([0, 1, 2, 4], 1.0),
+            ([3, 1, 2, 7], 1.0),
+            ([5, 1, 4, 7], 1.0),
+            ([6, 2, 4, 7], 1.0),
+            ([1, 2, 4, 7], 2.0),
+        ] {
+            moments.add_tet(tet.map(corner), volume);
+        }
+        let matrix = moments.matrix();
+        for (i, side) in [1.0, 2.0, 3.0].into_iter().enumerate() {
+            for j in 0..3 {
+                let wanted = if i == j { side * side / 12.0 } else { 0.0 };
+                assert!((matrix[i][j] - wanted).abs() < 1e-14, "{matrix:?}");
+            }
+        }
+    }
 
     #[test]
     fn principal_axes_are_eigenvectors() {

@@ -1,5 +1,6 @@
 //! Load and section along an axis, and their values for a plane across it.
 
+use super::axes::Moments;
 use super::load::{SizeFn, tally};
 use super::surface::Plane;
 use crate::mesh::Mesh;
@@ -22,11 +23,6 @@ pub struct ChosenPlane {
 
 /// Ends of no position.
 const NO_POSITION: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
-
-#[inline]
-fn with([low, high]: [f64; 2], s: f64) -> [f64; 2] {
-    [low.min(s), high.max(s)]
-}
 
 /// Load and section along one axis, by bins between the ends of the mesh.
 pub(super) struct LoadProfile {
@@ -94,40 +90,65 @@ impl ProfileBuilder {
     }
 }
 
-impl LoadProfile {
-    pub fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn, axis: Point) -> Self {
-        let mut all_ends = NO_POSITION;
-        for v in mesh.vertex_ids() {
-            all_ends = with(all_ends, axis.dot(mesh.point(v)));
-        }
-        let (spread, tet_ends) = Self::gather_between(mesh, h, axis, all_ends);
-        if tet_ends == all_ends {
-            return spread;
-        }
-        Self::gather_between(mesh, h, axis, tet_ends).0
+/// Load and section along each of the axes, and the moments of the load about `origin`.
+///
+/// `origin` is a point near the mesh, so that digits are kept.
+pub(super) fn gather_profiles<P: Pages>(
+    mesh: &mut Mesh<P>,
+    h: &SizeFn,
+    axes: &[Point],
+    origin: Point,
+) -> (Vec<LoadProfile>, Moments) {
+    let mut ends = vec![NO_POSITION; axes.len()];
+    for v in mesh.vertex_ids() {
+        widen(&mut ends, axes, mesh.point(v));
     }
+    // Nearly always those of the tetrahedra: few vertices have none.
+    let (gathered, ends_of_tets) = gather_between(mesh, h, axes, &ends, origin);
+    if ends_of_tets == ends {
+        return gathered;
+    }
+    gather_between(mesh, h, axes, &ends_of_tets, origin).0
+}
 
-    /// Gathers between the ends, which should be those of the corners of all tetrahedra; returns these too.
-    fn gather_between<P: Pages>(
-        mesh: &mut Mesh<P>,
-        h: &SizeFn,
-        axis: Point,
-        ends: [f64; 2],
-    ) -> (Self, [f64; 2]) {
-        let mut bounds_of_tets = NO_POSITION;
-        let empty = || ProfileBuilder::new(axis, ends);
-        let visit_corner = &mut |p| bounds_of_tets = with(bounds_of_tets, axis.dot(p));
-        let [mut ramps, others @ ..] = tally(mesh, h, empty, visit_corner, |ramps, piece| {
-            let [a, b, c, d] = piece.points;
-            let at = [axis.dot(a), axis.dot(b), axis.dot(c), axis.dot(d)];
-            let low = at[0].min(at[1]).min(at[2].min(at[3]));
-            let high = at[0].max(at[1]).max(at[2].max(at[3]));
-            ramps.add(low, high, piece.load, piece.load * piece.h);
+fn widen(ends: &mut [[f64; 2]], axes: &[Point], p: Point) {
+    for ([low, high], axis) in ends.iter_mut().zip(axes) {
+        let s = axis.dot(p);
+        (*low, *high) = (low.min(s), high.max(s));
+    }
+}
+
+/// Gathers between the ends, which should be those of the corners of all tetrahedra; returns these too.
+fn gather_between<P: Pages>(
+    mesh: &mut Mesh<P>,
+    h: &SizeFn,
+    axes: &[Point],
+    ends: &[[f64; 2]],
+    origin: Point,
+) -> ((Vec<LoadProfile>, Moments), Vec<[f64; 2]>) {
+    let mut ends_of_tets = vec![NO_POSITION; axes.len()];
+    let empty = || {
+        let builders = axes.iter().zip(ends).map(|(&axis, &ends)| ProfileBuilder::new(axis, ends));
+        (builders.collect::<Vec<_>>(), Moments::default())
+    };
+    let visit_corner = &mut |p| widen(&mut ends_of_tets, axes, p);
+    let [(mut profiles, mut moments), others @ ..] =
+        tally(mesh, h, empty, visit_corner, |(profiles, moments), piece| {
+            for ramps in profiles {
+                let [a, b, c, d] = piece.points.map(|p| ramps.axis.dot(p));
+                let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+                ramps.add(low, high, piece.load, piece.load * piece.h);
+            }
+            moments.add_tet(piece.points.map(|p| p - origin), piece.load);
         });
-        others.iter().for_each(|other| ramps.add_all(other));
-        (ramps.sum_up(), bounds_of_tets)
+    for (more_profiles, more_moments) in &others {
+        profiles.iter_mut().zip(more_profiles).for_each(|(ramps, more)| ramps.add_all(more));
+        moments.add_all(more_moments);
     }
+    ((profiles.into_iter().map(ProfileBuilder::sum_up).collect(), moments), ends_of_tets)
+}
 
+impl LoadProfile {
     /// Position below which the share `low` of the load lies.
     pub fn quantile(&self, low: f64) -> f64 {
         let wanted = low * self.load.iter().sum::<f64>();

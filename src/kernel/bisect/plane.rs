@@ -7,11 +7,11 @@
 //! Source: the paper, section 1.1, "Defining the cutting plane".
 
 use super::axes::{Moments, principal_axes};
-use super::load::{SizeFn, tally};
-use super::load_profile::{ChosenPlane, LoadProfile, ProfileBuilder};
+use super::load::SizeFn;
+use super::load_profile::{ChosenPlane, LoadProfile, gather_profiles};
 use super::surface::{CuttingSurface, Plane};
 use crate::mesh::Mesh;
-use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::geom::Point;
 use tetdb_base::storage::Pages;
 
 /// Positions tried on each side of the balanced one, and their distance in units of h: a plane that grazes a flat wall cuts
@@ -24,6 +24,9 @@ const GRAZED: f64 = 0.35;
 const TOLERANCE: f64 = 0.003;
 /// Least gain in grazed vertices that a shift away from the balanced position must bring, as a share.
 const GAIN: f64 = 0.1;
+/// A plane across a coordinate is preferred where it costs a hundredth more at most. So an axis of inertia with such a cosine to a
+/// coordinate is no candidate: the section of a prism grows by one over the cosine.
+const NEAR_COORDINATE: f64 = 0.99;
 
 /// Choices of the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,34 +50,34 @@ pub fn choose<P: Pages>(
     low: f64,
     choice: PlaneChoice,
 ) -> ChosenPlane {
+    let along = |mesh: &mut Mesh<P>, axis| gather_profiles(mesh, h, &[axis], origin).0.remove(0);
     let spread = match choice {
-        PlaneChoice::Given(plane) => {
-            return LoadProfile::gather(mesh, h, plane.normal).at(plane.offset);
-        }
+        PlaneChoice::Given(plane) => return along(mesh, plane.normal).at(plane.offset),
         PlaneChoice::Centroids => {
             let axis = principal_axes(&centroid_moments(mesh, origin))[0];
-            LoadProfile::gather(mesh, h, axis)
+            along(mesh, axis)
         }
-        PlaneChoice::Load => {
-            let (grid, mut profiles) = Grid::gather(mesh, h);
-            let mut axes = principal_axes(&grid.moments().matrix()).to_vec();
-            axes.extend(COORDINATES);
-            // Fewest faces; of equals the first, but an axis along a coordinate is preferred where it costs a hundredth at most.
-            let areas = axes.iter().map(|&axis| {
-                let spread = grid.spread(axis);
-                spread.at(spread.quantile(low)).area
-            });
-            let scores = (0..).zip(areas).map(|(k, a)| if k < 3 { 1.01 * a } else { a });
-            let best = scores.zip(0..).min_by(|a, b| a.0.total_cmp(&b.0));
-            let best: usize = best.expect("there are axes").1;
-            match best.checked_sub(3) {
-                Some(coordinate) => profiles.swap_remove(coordinate),
-                None => LoadProfile::gather(mesh, h, axes[best]),
-            }
-        }
+        PlaneChoice::Load => best_profile(mesh, h, origin, low),
     };
     let chosen = spread.at(spread.quantile(low));
     shift(mesh, chosen, &spread)
+}
+
+/// The profile along the axis whose plane promises the fewest interface faces.
+fn best_profile<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn, origin: Point, low: f64) -> LoadProfile {
+    let (mut profiles, moments) = gather_profiles(mesh, h, &[Point::X, Point::Y, Point::Z], origin);
+    let mut oblique = principal_axes(&moments.matrix()).to_vec();
+    oblique.retain(|axis| axis.abs().max_element() < NEAR_COORDINATE);
+    if !oblique.is_empty() {
+        profiles.extend(gather_profiles(mesh, h, &oblique, origin).0);
+    }
+    let score = |(k, profile): (usize, &LoadProfile)| {
+        let area = profile.at(profile.quantile(low)).area;
+        if k < 3 { area } else { area / NEAR_COORDINATE }
+    };
+    let scores: Vec<f64> = profiles.iter().enumerate().map(score).collect();
+    let best = (0..scores.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]));
+    profiles.swap_remove(best.expect("there are axes"))
 }
 
 /// Sets the size of every vertex.
@@ -83,113 +86,6 @@ pub(super) fn set_sizes<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn) {
         let p = mesh.point(v);
         mesh.set_size(v, h(p) as f32);
     }
-}
-
-/// Axes whose spreads are gathered with the grid: one of them is chosen more often than not, and dividing the mesh into pieces a second
-/// time costs more than three sums in place of one.
-const COORDINATES: [Point; 3] = [Point::X, Point::Y, Point::Z];
-
-/// Cells of the grid along each axis.
-const CELLS: usize = 48;
-
-/// The load on a coarse grid: enough to compare directions.
-struct Grid {
-    low: Point,
-    width: Point,
-    /// Load and ∫ h⁻² of each cell.
-    cells: Vec<[f64; 2]>,
-}
-
-impl Grid {
-    /// The grid, and the spreads along [`COORDINATES`].
-    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn) -> (Self, Vec<LoadProfile>) {
-        // Nearly always that of the tetrahedra: few vertices have none.
-        let around_all = bounds_of_vertices(mesh);
-        let (gathered, around_tets) = Self::gather_in(mesh, h, around_all);
-        if around_tets == around_all {
-            return gathered;
-        }
-        Self::gather_in(mesh, h, around_tets).0
-    }
-
-    /// Gathers in a box, which should be that of the corners of all tetrahedra; returns that too.
-    fn gather_in<P: Pages>(
-        mesh: &mut Mesh<P>,
-        h: &SizeFn,
-        bounds: Aabb,
-    ) -> ((Self, Vec<LoadProfile>), Aabb) {
-        let mut bounds_of_tets = Aabb::EMPTY;
-        let width = (bounds.high - bounds.low) / CELLS as f64;
-        let (low, high) = (bounds.low.to_array(), bounds.high.to_array());
-        let empty = || {
-            let profiles =
-                [0, 1, 2].map(|k| ProfileBuilder::new(COORDINATES[k], [low[k], high[k]]));
-            (vec![[0.0; 2]; CELLS * CELLS * CELLS], profiles)
-        };
-        let visit_corner = &mut |p| bounds_of_tets = bounds_of_tets.with(p);
-        let [(mut cells, mut profiles), others @ ..] =
-            tally(mesh, h, empty, visit_corner, |(cells, profiles), piece| {
-                let [a, b, c, d] = piece.points;
-                let middle = (a + b + c + d) * 0.25;
-                let section = piece.load * piece.h;
-                let at = (middle - bounds.low) / width;
-                let number = |c: f64| (c as usize).min(CELLS - 1);
-                let cell = (number(at.z) * CELLS + number(at.y)) * CELLS + number(at.x);
-                let cell = &mut cells[cell];
-                *cell = [cell[0] + piece.load, cell[1] + section];
-                let from = a.min(b).min(c.min(d)).to_array();
-                let to = a.max(b).max(c.max(d)).to_array();
-                for (k, ramps) in profiles.iter_mut().enumerate() {
-                    ramps.add(from[k], to[k], piece.load, section);
-                }
-            });
-        for (more_cells, more_profiles) in &others {
-            for (cell, more) in cells.iter_mut().zip(more_cells) {
-                *cell = [cell[0] + more[0], cell[1] + more[1]];
-            }
-            (profiles.iter_mut().zip(more_profiles)).for_each(|(ramps, more)| ramps.add_all(more));
-        }
-        let grid = Self { low: bounds.low, width, cells };
-        let profiles = profiles.into_iter().map(ProfileBuilder::sum_up).collect();
-        ((grid, profiles), bounds_of_tets)
-    }
-
-    /// Middles of the cells with something in them.
-    fn filled(&self) -> impl Iterator<Item = (Point, [f64; 2])> + '_ {
-        let filled = self.cells.iter().enumerate().filter(|(_, c)| c[0] > 0.0);
-        filled.map(|(n, &cell)| {
-            let at = [n % CELLS, n / CELLS % CELLS, n / (CELLS * CELLS)];
-            let at = Point::from_array(at.map(|c| c as f64 + 0.5));
-            (self.low + at * self.width, cell)
-        })
-    }
-
-    fn moments(&self) -> Moments {
-        let mut moments = Moments::default();
-        for (middle, cell) in self.filled() {
-            moments.add(middle - self.low, cell[0]);
-        }
-        moments
-    }
-
-    fn spread(&self, axis: Point) -> LoadProfile {
-        let half = (self.width * 0.5).abs().dot(axis.abs());
-        let ends = self.filled().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], (p, _)| {
-            let s = axis.dot(p);
-            [l.min(s - half), h.max(s + half)]
-        });
-        let mut ramps = ProfileBuilder::new(axis, ends);
-        for (middle, [load, section]) in self.filled() {
-            let s = axis.dot(middle);
-            ramps.add(s - half, s + half, load, section);
-        }
-        ramps.sum_up()
-    }
-}
-
-fn bounds_of_vertices<P: Pages>(mesh: &mut Mesh<P>) -> Aabb {
-    let vertices = mesh.vertex_ids();
-    vertices.fold(Aabb::EMPTY, |bounds, v| bounds.with(mesh.point(v)))
 }
 
 fn centroid_moments<P: Pages>(mesh: &mut Mesh<P>, origin: Point) -> [[f64; 3]; 3] {
