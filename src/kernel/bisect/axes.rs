@@ -40,6 +40,12 @@ impl Moments {
         let (xy, xz, yz) = (s[3] - g.x * g.y, s[4] - g.x * g.z, s[5] - g.y * g.z);
         [[s[0] - g.x * g.x, xy, xz], [xy, s[1] - g.y * g.y, yz], [xz, yz, s[2] - g.z * g.z]]
     }
+
+    /// Standard deviation along a unit vector.
+    pub fn spread(&self, axis: Point) -> f64 {
+        let [x, y, z] = self.matrix().map(Point::from_array);
+        axis.dot(Point::new(x.dot(axis), y.dot(axis), z.dot(axis))).sqrt()
+    }
 }
 
 /// Unit eigenvectors of a symmetric matrix, the largest eigenvalue first, by Jacobi's rotations.

@@ -24,9 +24,9 @@ const GRAZED: f64 = 0.35;
 const TOLERANCE: f64 = 0.003;
 /// Least gain in grazed vertices that a shift away from the balanced position must bring, as a share.
 const GAIN: f64 = 0.1;
-/// A plane across a coordinate is preferred where it costs a hundredth more at most. So an axis of inertia with such a cosine to a
-/// coordinate is no candidate: the section of a prism grows by one over the cosine.
-const NEAR_COORDINATE: f64 = 0.99;
+/// A plane across a coordinate is preferred where it costs a hundredth more at most. An axis of inertia along which the load spreads
+/// little farther than along a coordinate is no candidate at all: sections of equal loads are the smaller the longer the body is.
+const PREFERRED: f64 = 0.99;
 
 /// Choices of the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,14 +66,16 @@ pub fn choose<P: Pages>(
 /// The profile along the axis whose plane promises the fewest interface faces.
 fn best_profile<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn, origin: Point, low: f64) -> LoadProfile {
     let (mut profiles, moments) = gather_profiles(mesh, h, &[Point::X, Point::Y, Point::Z], origin);
-    let mut oblique = principal_axes(&moments.matrix()).to_vec();
-    oblique.retain(|axis| axis.abs().max_element() < NEAR_COORDINATE);
+    let matrix = moments.matrix();
+    let along_coordinates = (0..3).map(|k| matrix[k][k]).fold(0.0, f64::max);
+    let mut oblique = principal_axes(&matrix).to_vec();
+    oblique.retain(|&axis| moments.spread(axis) * PREFERRED > along_coordinates.sqrt());
     if !oblique.is_empty() {
         profiles.extend(gather_profiles(mesh, h, &oblique, origin).0);
     }
     let score = |(k, profile): (usize, &LoadProfile)| {
         let area = profile.at(profile.quantile(low)).area;
-        if k < 3 { area } else { area / NEAR_COORDINATE }
+        if k < 3 { area } else { area / PREFERRED }
     };
     let scores: Vec<f64> = profiles.iter().enumerate().map(score).collect();
     let best = (0..scores.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]));
