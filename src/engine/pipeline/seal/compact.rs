@@ -23,6 +23,9 @@ use tetdb_kernel::mesh::anatomy::FACES;
 use tetdb_kernel::mesh::{Mesh, Scan, VertexTag, dense, scan_parts, sparse, tets_of_page};
 use tetdb_store::sealed::{Form, Sealed, SealedWriter, sorted_face};
 
+/// Bytes that a writer holds beside its share of the buffers, however small that is: tables of faces, chunks being packed. Pages make room.
+const WRITER_BYTES: u64 = 12 << 20;
+
 /// Writes `mesh` to `target`, with the order and numbers of a sealed sub-domain in every storage form.
 ///
 /// Invariant: `tet_of` is right for all vertices. Effects: the mesh's scratch map is overwritten and cleared.
@@ -38,6 +41,9 @@ pub fn seal<P: Pages>(
         target.generation,
         (target.memory / 2) as usize,
     )?;
+    if let Some([_, most]) = mesh.pages().bytes_used() {
+        mesh.pages_mut().use_at_most(most.saturating_sub(WRITER_BYTES).max(most / 2));
+    }
     mesh.clear_scratch();
     vertices(mesh, target, &mut writer, watch)?;
     let mut neighbors = match target.form {
@@ -48,6 +54,7 @@ pub fn seal<P: Pages>(
     let faces = tets(order, mesh.n_tets(), &mut neighbors, target, &mut writer, watch)?;
     facets(mesh, faces, target, &mut writer)?;
     mesh.clear_scratch();
+    mesh.pages_mut().use_at_most(u64::MAX);
     Ok(writer.finish()?)
 }
 
