@@ -216,7 +216,7 @@ pub fn write(
 
 /// Says that a format has numbers only where the store has names.
 fn note_numbers(format: MeshFormat, store: &Store, console: &Console) {
-    use MeshFormat::{Gmsh22, Medit, MeditBinary, Nastran, Numpy, TetGen};
+    use MeshFormat::{Gmsh22, Medit, MeditBinary, Nastran, Numpy, Su2, TetGen};
     let summary = store.summary();
     if let Some(set) = summary.label_sets.first()
         && matches!(format, Gmsh22 | Medit | MeditBinary | Nastran | Numpy | TetGen)
@@ -228,6 +228,9 @@ fn note_numbers(format: MeshFormat, store: &Store, console: &Console) {
     }
     if format == Nastran {
         console.note("note: this format rounds coordinates to 16 characters, 11 to 15 digits");
+    }
+    if format == Su2 {
+        console.note("note: this format has faces of the boundary alone, not sheets and walls between regions");
     }
     let is_name = |name: &String| name.parse::<u64>().is_err();
     if matches!(format, Medit | MeditBinary | Numpy | TetGen)

@@ -197,6 +197,28 @@ fn what_makes_no_sense_is_refused() {
     assert_eq!(place.digest("a.tetdb"), new);
 }
 
+/// What comes back replaces what is there, so it is read before.
+#[test]
+fn what_is_damaged_does_not_come_back() {
+    let (place, _, new) = made();
+    let generation = |name: &String| {
+        let digits = name.rsplit_once("-g").and_then(|(_, end)| end.strip_suffix(".redb"));
+        digits.and_then(|digits| digits.parse::<u32>().ok()).expect("a generation")
+    };
+    let both = files(&place).0.into_iter().filter(|name| name.contains("/subdomain-00001-"));
+    let path = place.path(&both.min_by_key(generation).expect("two files"));
+    let mut bytes = std::fs::read(&path).expect("readable");
+    bytes[8 * 4096..12 * 4096].fill(0x5A);
+    std::fs::write(&path, bytes).expect("writable");
+    for line in ["version a.tetdb restore base", "resaturate a.tetdb --undo"] {
+        let done = place.run_line(line);
+        assert_eq!(done.exit(), Some(4), "{}", done.stderr());
+        assert!(done.stderr().contains("nothing was changed"), "{}", done.stderr());
+        assert_eq!(place.digest("a.tetdb"), new);
+        place.run_line("verify a.tetdb").succeeds();
+    }
+}
+
 #[test]
 fn kills_leave_versions_whole() {
     let (place, old, new) = made();

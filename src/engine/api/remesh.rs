@@ -12,7 +12,7 @@ use super::store::{open_finished, open_to_change};
 use super::{Error, Settings, Sizes, Store, Surface, TransferredField, guarded, job, verify};
 use crate::pipeline::{self, Options, RECIPE, ResaturateSummary, Resaturation, Values};
 use tetdb_schema::catalog::SubdomainRow;
-use tetdb_store::audit::Level;
+use tetdb_store::audit::{self, Level};
 use tetdb_store::store::{BEFORE, Catalog, StoreError, WriterLock};
 
 /// A request to mesh sub-domains again; see [`Store::remesh`].
@@ -106,6 +106,13 @@ impl Store {
         let summary = guarded(&settings, || {
             let mut catalog = open_to_change(&path, &settings)?;
             let (lock, number) = (catalog.lock(), which(&mut catalog)?);
+            // What is there now goes with an undo, so that what comes back must be sound.
+            if let Some(damage) = audit::damage_of_version(&mut catalog, number)?.into_iter().next()
+            {
+                let mut error = Error::from(damage);
+                error.add("; it would come back, so nothing was changed");
+                return Err(error);
+            }
             let summary = pipeline::restore(&mut catalog, number)?;
             catalog.close()?;
             if let (true, Some(lock)) = (verify, lock) {

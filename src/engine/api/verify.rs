@@ -108,10 +108,14 @@ pub(super) fn sentence(report: &Report) -> String {
         report.inner_faces
     );
     if report.against_input {
-        text += &format!(
-            "; all {} input triangles present, no vertex added on the surface",
-            report.triangles_present + report.triangles_unfilled
-        );
+        text += &match report.triangles_unfilled {
+            0 => format!("; all {} input triangles present", report.triangles_present),
+            n => format!(
+                "; {} input triangles present, {n} others touch no filled region",
+                report.triangles_present
+            ),
+        };
+        text += ", no vertex added on the surface";
     }
     if report.edges_present + report.points_present > 0 {
         text += &format!(

@@ -158,6 +158,7 @@ impl WriteError {
             Self::Store(StoreError::Changed { .. }) => {
                 "run the command again: the file is then of the store as it is now"
             }
+            Self::Store(StoreError::NoSubdomain { .. }) => "`tetdb info` lists the sub-domains",
             Self::Store(_) | Self::Elsewhere(_) => "look at the state of the store",
         }
     }
@@ -185,7 +186,8 @@ fn among(filled: &[u32]) -> String {
 fn word_of(error: &StoreError) -> Code {
     match error {
         StoreError::Storage(StorageError::Cancelled) => Code::Stopped,
-        StoreError::NotFound { .. } | StoreError::NoSubdomain { .. } => Code::NoSuchStore,
+        StoreError::NotFound { .. } => Code::NoSuchStore,
+        StoreError::NoSubdomain { .. } => Code::NoSuchPart,
         StoreError::NotOurs { .. } => Code::NotAStore,
         StoreError::Unfinished { .. } | StoreError::Sealed(SealedError::NotSealed { .. }) => {
             Code::StoreUnfinished

@@ -34,6 +34,18 @@ pub(super) fn snapshot_damage(store: &mut Catalog) -> Result<Vec<StoreError>, St
     Ok(found.0)
 }
 
+/// Lists the damage in the sub-domains that a version would bring back. Errors: as [`damage`].
+pub fn damage_of_version(store: &mut Catalog, number: u32) -> Result<Vec<StoreError>, StoreError> {
+    let mut found = DamageFound(Vec::new());
+    if let Some(version) = store.versions()?.get(&number) {
+        let (now, mut then) = (store.subdomains()?, store.at(version));
+        for row in then.subdomains()?.into_iter().filter(|row| !now.contains(row)) {
+            found.add_part(&mut then, row)?;
+        }
+    }
+    Ok(found.0)
+}
+
 struct DamageFound(Vec<StoreError>);
 
 impl DamageFound {

@@ -31,7 +31,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 pub use compare::{Population, Qualities, qualities};
-pub use damage::damage;
+pub use damage::{damage, damage_of_version};
 pub use embedded::wire_bytes;
 pub use options::VerifyOptions;
 pub use part_report::PartReport;

@@ -31,7 +31,7 @@ pub(super) fn farthest_inside(
     rows.clear();
     rows.extend(planes.map(|(n, b, s)| ([n.x, n.y, n.z, s / reach], b / reach)));
     // Any order will do; those that the center is farthest behind are likely to decide, and the rest is soon looked through.
-    rows.sort_by(|one, two| (one.1 * two.0[3]).total_cmp(&(two.1 * one.0[3])));
+    rows.sort_by(|one, two| (one.1 / one.0[3]).total_cmp(&(two.1 / two.0[3])));
     // The last variable is the least of the quotients; a scale of 1e9 has room for planes that leave nothing between them.
     let low = [-1.0, -1.0, -1.0, -1e9];
     let x = solve::<4>(rows, [0.0, 0.0, 0.0, 1.0], low, [1.0; 4], fewer)?;
@@ -135,6 +135,27 @@ mod tests {
             let inscribed = 0.5 * (high - low).min_element();
             let least = (p - low).min(high - p).min_element();
             assert!(least > 0.4 * inscribed, "{p} {thickness}");
+        }
+    }
+
+    #[test]
+    fn planes_that_the_center_is_equally_far_behind_are_put_in_order() {
+        let mut seed = 5u64;
+        let mut next = || {
+            seed = tetdb_base::geom::mix(seed);
+            (seed >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for _ in 0..500 {
+            // Quotients that are equal but for rounding, of numbers of all sizes.
+            let mut plane = || {
+                let n = Point::new(next() - 0.5, next() - 0.5, next() - 0.5).normalize();
+                let far = 10f64.powf(-9.0 * next());
+                (n, -0.1 * far, far)
+            };
+            let planes: Vec<_> = (0..100).map(|_| plane()).collect();
+            let found =
+                farthest_inside(Point::ZERO, 1.0, planes.into_iter(), &mut Scratch::default());
+            assert!(found.is_none_or(|(p, _)| p.is_finite()));
         }
     }
 
