@@ -387,10 +387,11 @@ class Store:
         return Merged(points, tets, regions, owners, vertex_ids)
 
     def to_pyvista(self, subdomain: int | Sequence[int] | None = None) -> Any:
-        """A PyVista ``UnstructuredGrid`` of the tetrahedra, with cell data `region` and `subdomain`; needs the package pyvista.
+        """A PyVista ``UnstructuredGrid`` of the tetrahedra, with cell data `region`, `subdomain` and `quality`; needs the package pyvista.
 
         The input's triangles with their labels are in :attr:`Subdomain.facets`, and in what :meth:`export` writes.
         """
+        grid.cell_data["quality"] = _native.qualities(mesh.points, mesh.tets)
         pyvista = needed("pyvista")
         mesh = self.merged(subdomain)
         cells = {pyvista.CellType.TETRA: mesh.tets}
