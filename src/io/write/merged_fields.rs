@@ -36,7 +36,8 @@ pub(super) fn open_fields(
 
 /// Returns whether a field has values at all vertices that are written, also at midpoints of edges and at doubles of vertices on sheets.
 pub fn has_values_at(field: &FieldRow, has_midpoints: bool, has_doubles: bool) -> bool {
-    field.place == FieldPlace::Tets || !has_doubles && !(has_midpoints && field.number.is_integer())
+    let has_means = !field.number.is_integer();
+    field.place == FieldPlace::Tets || (!has_doubles && (!has_midpoints || has_means))
 }
 
 /// Returns whether doubles hold all values of a field. Ranges are rounded, so 2^53 itself is not let through.
