@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
 use super::hdf_rows::HdfRows;
-use super::{Feed, FilePlace, RawField, ReadFault, Result};
+use super::{Feed, FilePlace, ReadFault, Result};
 use crate::read::error::Spot;
 use crate::read::xml::base64_word;
 use tetdb_schema::field::{FieldNumber, Scalar};
@@ -255,7 +255,7 @@ impl Numbers {
     /// The next number, which must be whole.
     #[inline]
     pub fn integer(&mut self) -> Result<i64> {
-        self.whole()?.ok_or_else(|| {
+        self.next_integer()?.ok_or_else(|| {
             let (expected, found) = (self.what.to_owned(), "a broken number".to_owned());
             self.place.refuse(ReadFault::Unexpected { expected, found })
         })
@@ -263,7 +263,7 @@ impl Numbers {
 
     /// The next number; `None` for one that is not whole, or beyond 64 bits.
     #[inline]
-    fn whole(&mut self) -> Result<Option<i64>> {
+    fn next_integer(&mut self) -> Result<Option<i64>> {
         Ok(match &mut self.from {
             From::Text(feed) => {
                 feed.need_word(self.what)?;
@@ -285,17 +285,22 @@ impl Numbers {
         })
     }
 
-    /// Adds the words of the next value of a field to `words`; `row` is its place among these numbers. Errors: its type has no such number.
-    pub fn value(&mut self, field: &RawField, row: u64, words: &mut Vec<u64>) -> Result<()> {
-        let number = field.number;
-        for _ in 0..field.components {
+    /// Adds the words of the next value of a field to `words`: so many numbers of a type. Errors: the type has no such number; the name of the
+    /// array and the value's place among these say where.
+    pub fn value(
+        &mut self,
+        (number, components): (FieldNumber, u32),
+        (array, row): (&str, u64),
+        words: &mut Vec<u64>,
+    ) -> Result<()> {
+        for _ in 0..components {
             let next = match number.is_integer() {
-                true => self.whole()?.map(Scalar::Int),
+                true => self.next_integer()?.map(Scalar::Int),
                 false => Some(Scalar::Float(self.real()?)),
             };
             let Some(word) = next.and_then(|next| number.pack(next)) else {
                 let first = if let From::Hdf(hdf) = &self.from { hdf.rows.first() } else { 0 };
-                let (array, row, number) = (field.name.clone(), first + row, number.word());
+                let (array, row, number) = (array.to_owned(), first + row, number.word());
                 return Err(self.place.refuse(ReadFault::FieldValue { array, row, number }));
             };
             words.push(word);

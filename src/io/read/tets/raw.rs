@@ -191,7 +191,7 @@ impl RawMesh {
         let field = &mut self.fields[field];
         for i in 0..n {
             row.clear();
-            numbers.value(field, i, &mut row)?;
+            numbers.value((field.number, field.components), (&field.name, i), &mut row)?;
             row.iter().for_each(|&word| field.words.push(word));
         }
         numbers.end()

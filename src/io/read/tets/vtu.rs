@@ -381,7 +381,9 @@ impl Grid {
             let (label, ghost) = (next(&mut labels)?, next(&mut ghosts)?);
             row.clear();
             for (field, numbers) in &mut values {
-                numbers.value(&mesh.fields[*field], cell, &mut row)?;
+                let field = &mesh.fields[*field];
+                let kind = (field.number, field.components);
+                numbers.value(kind, (&field.name, cell), &mut row)?;
             }
             if ghost & 1 != 0 {
                 n_ghosts += 1;
