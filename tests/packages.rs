@@ -111,6 +111,7 @@ fn dependencies_come_from_crates_io() {
         "Cargo.lock",
         "tools/python/Cargo.lock",
         "tools/sql/Cargo.lock",
+        "tools/fuzz/Cargo.lock",
         "tests/outside/Cargo.lock",
     ] {
         let lock = table(path);

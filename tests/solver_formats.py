@@ -61,6 +61,16 @@ def components(values):
     return values.reshape(len(values), -1).astype(float)
 
 
+def check_middles(cells, values, stem):
+    """Values at the nodes of tetrahedra of second order, in VTK's order, by name: in the middle of an edge the mean of both ends."""
+    assert values, f"{stem} has no values"
+    for name, of in values.items():
+        for node, (a, b) in enumerate([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)], 4):
+            mean = of[cells[:, a]].astype(float) / 2 + of[cells[:, b]].astype(float) / 2
+            assert (of[cells[:, node]] == mean.astype(of.dtype)).all(), name
+    print(f"{stem}: {sorted(values)} have means in the middles of edges")
+
+
 # Exodus II.
 
 # Nodes of the sides of a tetrahedron, by the Exodus manual.
@@ -159,6 +169,12 @@ def check_exodus(tetdb, store, mesh, stem):
         points = np.column_stack([file.variables["coord" + x][:].data for x in "xyz"])
         nodes = [file.variables[f"connect{b}"][:].data - 1 for b in range(1, len(mesh.volume) + 1)]
         assert (file.variables["connect1"].elem_type, len(points)) == ("TETRA10", file.variables["node_num_map"][-1])
+        names = [bytes(row).split(b"\0")[0].decode() for row in file.variables["name_nod_var"][:].data]
+        # Doubles, but no finer than the field's own numbers.
+        kind = lambda name: mesh.fields[name.split("_")[0]].dtype
+        found = {name: file.variables[f"vals_nod_var{i}"][0].data.astype(kind(name)) for i, name in enumerate(names, 1)}
+        assert (found["T"][:len(mesh.points)] == mesh.fields["T"]).all() and "n" not in found
+        check_middles(np.concatenate(nodes), found, stem + ".second.e")
     near({0: float(volumes(points, corners_of(points, np.concatenate(nodes))).sum())}, {0: sum(mesh.volume.values())})
     seen = meshio.read(stem + ".exo")
     assert (seen.points == mesh.points).all()
@@ -195,6 +211,9 @@ def check_xdmf(tetdb, store, mesh, stem):
     second = meshio.read(stem + ".second.xdmf")
     tets = corners_of(second.points, second.cells_dict["tetra10"])
     near(by(second.cell_data["region"][0], volumes(second.points, tets)), mesh.volume)
+    found = {name: values for name, values in second.point_data.items() if name in mesh.fields}
+    assert all((values[:len(mesh.points)] == mesh.fields[name]).all() for name, values in found.items()) and "n" not in found
+    check_middles(second.cells_dict["tetra10"], found, stem + ".second.xdmf")
     facets = meshio.read(stem + ".second_boundary.xdmf").cells_dict["triangle6"]
     for node, (a, b) in enumerate([(0, 1), (1, 2), (0, 2)], 3):
         assert (second.points[facets[:, node]] == (second.points[facets[:, a]] / 2 + second.points[facets[:, b]] / 2)).all()
@@ -351,6 +370,9 @@ def check_vtkhdf_for_dolfinx(tetdb, store, mesh, stem):
             assert nodes.shape == (n * n_cells,) and nodes.dtype == np.int64 and nodes[:].max() == n_points - 1
             for name in ("Types", "Offsets", "Points", "Connectivity", "NumberOfPoints"):
                 assert root[name].chunks is None and root[name].id.get_offset() is not None, f"{name} is not one piece of the file"
+            if order == "2":
+                found = {name: values[:] for name, values in root["PointData"].items() if name in mesh.fields}
+                check_middles(nodes[:].reshape(-1, 10), found, path)
     print(f"{stem}.one1.vtkhdf: laid out as DOLFINx reads it, by h5py {h5py.__version__}")
 
 

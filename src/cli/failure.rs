@@ -133,6 +133,9 @@ fn help_of(code: Code) -> &'static str {
             "`tetdb check SURFACE` lists the places, and says whether --repair resolve, which divides crossing triangles, leaves a surface that can be meshed"
         }
         Code::EmptySurface => "choose a file that holds triangles",
+        Code::BadField => {
+            "--no-fields imports the mesh without arrays of values; or write this one with numbers of type float64"
+        }
         Code::CoordinateRange => "scale the surface to ordinary units, for example metres",
         Code::SurfaceTooLarge => "split the surface into parts and mesh them one by one",
         Code::IndexOutOfRange => {

@@ -14,7 +14,7 @@ use tetdb_engine::api::{Code, Field, FieldIds, FieldSource, NewField, Store, Wor
 pub fn run(args: &FieldArgs, console: &Console) -> Result<u8, Failure> {
     let read = match &args.action {
         FieldAction::Add(add) => &add.read,
-        FieldAction::List(read) => read,
+        FieldAction::List(list) => &list.read,
         FieldAction::Drop(drop) => &drop.read,
     };
     let settings = console.settings(memory::requested(read.memory.as_deref())?, None);
@@ -29,8 +29,8 @@ pub fn run(args: &FieldArgs, console: &Console) -> Result<u8, Failure> {
                 console.line(&format!("added {}", line(&field)));
             }
         }
-        FieldAction::List(_) => {
-            let fields = Store::open_with(&args.store, settings)?.fields()?;
+        FieldAction::List(list) => {
+            let fields = Store::open_with(&args.store, list.at.of(settings))?.fields()?;
             if console.is_json() {
                 console.answer(&json!({ "schema": 1, "fields": fields }));
             } else if fields.is_empty() {

@@ -347,8 +347,8 @@ fn exports_have_fields() {
         let text = String::from_utf8_lossy(&bytes);
         assert!(words.iter().all(|word| text.contains(word)), "{file}");
     }
-    let second = place.run_line("export a.tetdb s.vtu --order 2").succeeds().stderr();
-    assert!(second.contains("without T, u, T_2, u_2:"), "{second}");
+    let split = place.run_line("export a.tetdb s.vtu --split-sheets").succeeds().stderr();
+    assert!(split.contains("without T, u, T_2, u_2:"), "{split}");
     let info = place.run_line("info a.tetdb").succeeds().stdout();
     assert!(info.contains("field T: f64 at vertices"), "{info}");
     for color in ["T", "u.x", "mark"] {
@@ -360,5 +360,74 @@ fn exports_have_fields() {
     for words in ["--color V", "--color u", "--surface --color T"] {
         let error = place.run_line(&format!("snapshot a.tetdb a.svg {words} --json")).error();
         assert_eq!(error["code"], "bad-query", "{words}");
+    }
+}
+
+/// Nodes of a Gmsh file in text, and the rows of its values at nodes by name; tags are whole numbers.
+type GmshNodes = (Vec<(u64, [f64; 3])>, Vec<(String, Vec<Vec<f64>>)>);
+
+fn gmsh_nodes(place: &Place, file: &str) -> GmshNodes {
+    let text = std::fs::read_to_string(place.path(file)).expect("it was written");
+    let (mut nodes, mut values) = (Vec::new(), Vec::new());
+    let numbers = |line: &str| -> Vec<f64> {
+        line.split_whitespace().map(|word| word.parse().expect("a number")).collect()
+    };
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if line == "$Nodes" {
+            let blocks = numbers(lines.next().expect("counts"))[0] as usize;
+            for _ in 0..blocks {
+                let n = numbers(lines.next().expect("an entity"))[3] as usize;
+                let tags: Vec<Vec<f64>> = lines.by_ref().take(n).map(numbers).collect();
+                let points = lines.by_ref().take(n).map(numbers);
+                let points = points.map(|p| [p[0], p[1], p[2]]);
+                nodes.extend(tags.iter().map(|tag| tag[0] as u64).zip(points));
+            }
+        } else if line == "$NodeData" {
+            let head: Vec<&str> = lines.by_ref().take(8).collect();
+            let n = head[7].trim().parse().expect("a number of values");
+            values.push((head[1].to_owned(), lines.by_ref().take(n).map(numbers).collect()));
+        }
+    }
+    (nodes, values)
+}
+
+/// In exports of second order, a field has half the sum of the values at both ends in the middle of an edge.
+#[test]
+fn middles_of_edges_have_means() {
+    let place = Place::new();
+    two(&place);
+    for line in [
+        "T --at vertices --from 1+2*x-y",
+        "s --at vertices --from x,y,z,2*x,3*y,4*z",
+        "k --at vertices --from round(100*x) --type i32",
+        "q --at tets --from quality",
+    ] {
+        place.run_line(&format!("field a.tetdb add {line}")).succeeds();
+    }
+    let notes = place.run_line("export a.tetdb a.msh --order 2 --ascii").succeeds().stderr();
+    assert!(notes.contains("a.msh is written without k: integers"), "{notes}");
+    place.run_line("export a.tetdb p.msh --order 2 --ascii --pieces").succeeds();
+    for file in ["a.msh", "p_1.msh", "p_2.msh"] {
+        let (nodes, values) = gmsh_nodes(&place, file);
+        assert_eq!(values.len(), 2, "{file}");
+        for (name, rows) in values {
+            assert_eq!(rows.len(), nodes.len(), "{file}: {name}");
+            let of: std::collections::HashMap<u64, &[f64]> =
+                rows.iter().map(|row| (row[0] as u64, &row[1..])).collect();
+            for (tag, [x, y, z]) in &nodes {
+                let expected = match name.as_str() {
+                    "\"T\"" => vec![1.0 + 2.0 * x - y],
+                    _ => vec![*x, 2.0 * x, 4.0 * z, 2.0 * x, *y, 3.0 * y, 4.0 * z, 3.0 * y, *z],
+                };
+                let found = of[tag];
+                let is_near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-14;
+                assert!(found.len() == expected.len(), "{file}: {name}");
+                assert!(
+                    found.iter().zip(&expected).all(is_near),
+                    "{file}: {name} at node {tag}: {found:?}, expected {expected:?}"
+                );
+            }
+        }
     }
 }

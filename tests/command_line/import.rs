@@ -252,6 +252,66 @@ fn arrays_of_values_become_fields() {
 }
 
 #[test]
+fn a_value_that_no_field_holds_is_refused_with_its_place() {
+    let place = Place::new();
+    balls(&place);
+    place.run_line("export a.tetdb b.npy b.vtu").succeeds();
+    let n = place.run_line("info a.tetdb --json").succeeds().json()["tets"].as_u64();
+    let n = n.expect("a number") as usize;
+    let mut numbers = vec![0u8; 8 * n];
+    numbers[8 * 11 + 7] = 0x80;
+    place.write("b_big.npy", npy("<u8", &n.to_string(), &numbers));
+    // The second number of the last point is too large for single precision.
+    let points = place.run_line("info a.tetdb --json").succeeds().json()["vertices"].as_u64();
+    let text = "1 2 3 ".repeat(points.expect("a number") as usize - 1) + "1 2e39 3";
+    let array = "type=\"Float32\" Name=\"far\" NumberOfComponents=\"3\" format=\"ascii\"";
+    let array = format!("<PointData><DataArray {array}>{text}</DataArray>");
+    let file = std::fs::read(place.path("b.vtu")).expect("it was written");
+    let tag = b"<PointData>";
+    let at = file.windows(tag.len()).position(|bytes| bytes == tag).expect("it has values");
+    place.write("c.vtu", [&file[..at], array.as_bytes(), &file[at + tag.len()..]].concat());
+    let last = format!("value {}", points.expect("a number") - 1);
+    for (line, file, array, row) in
+        [("b.npy", "b_big.npy", "big", "value 11 "), ("c.vtu", "c.vtu", "far", &*last)]
+    {
+        let done = place.run_line(&format!("import {line} -o b.tetdb --json"));
+        let error = done.error();
+        assert_eq!((done.exit(), &error["code"]), (Some(3), &"bad-field".into()), "{error}");
+        assert!(error["where"].to_string().contains(file), "{error}");
+        for words in [array, row] {
+            assert!(error["message"].to_string().contains(words), "{words}: {error}");
+        }
+        assert!(error["help"].to_string().contains("--no-fields"), "{error}");
+        assert!(!place.path("b.tetdb").exists());
+        place.run_line(&format!("import {line} -o {array}.tetdb --no-fields")).succeeds();
+    }
+}
+
+/// Files whose names begin as those of the mesh do, and which no export of it wrote.
+#[test]
+fn arrays_of_other_meshes_are_left_out() {
+    let place = Place::new();
+    let digest = balls(&place);
+    place.run_line("field a.tetdb add w_1 --at vertices --from x").succeeds();
+    place.run_line("export a.tetdb a.npy").succeeds();
+    // Another mesh of as many tetrahedra, arrays of other lengths, and no array.
+    place.run_line("export a.tetdb a_b.npy").succeeds();
+    place.write("a_short.npy", npy("<f8", "2", &[0; 16]));
+    place.write("a_wide.npy", npy("<f8", "2, 3", &[0; 48]));
+    place.write("a_text.npy", "no array");
+    place.write("a_empty.npy", "");
+    let done = place.run_line("import a.npy -o b.tetdb").succeeds();
+    for words in ["values were left out: empty, global_id,", " short, ", " text, ", " wide"] {
+        assert!(done.stderr().contains(words), "{words}: {}", done.stderr());
+    }
+    assert!(done.stderr().contains("arrays of other meshes were left out: b\n"));
+    let info = place.run_line("info b.tetdb --json").succeeds().json();
+    let fields = info["fields"].as_array().expect("a list");
+    assert_eq!((fields.len(), &fields[0]["name"]), (1, &"w_1".into()));
+    assert_eq!(place.digest("b.tetdb"), digest);
+}
+
+#[test]
 fn values_of_gmsh_become_fields() {
     let place = Place::new();
     place.write("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n9 0 0 -1\n$EndNodes\n\

@@ -69,6 +69,13 @@ fn every_command_that_reads_reads_a_version() {
     place.run_line("mesh sample:box,h=0.1 -o b.tetdb --no-verify").succeeds();
     place.run_line("transfer a.tetdb b.tetdb --at-version base").succeeds();
     assert_eq!(fields(&place, "b.tetdb")[0]["name"], "T");
+    // A field added later is not part of the version, and its range is that of the version.
+    let then = at("field a.tetdb list --json").json()["fields"].clone();
+    place.run_line("field a.tetdb add later --at tets --from quality").succeeds();
+    assert_eq!(fields(&place, "a.tetdb").len(), 2);
+    assert_eq!(at("field a.tetdb list --json").json()["fields"], then);
+    assert_ne!(then[0]["values"], fields(&place, "a.tetdb")[0]["values"]);
+    assert!(at("field a.tetdb list").stdout().starts_with("T: f64 at vertices, "));
     // Both meshes have one sub-domain in common.
     let diff = place.run_line("version a.tetdb diff base now --json");
     assert_eq!(diff.exit(), Some(7));
@@ -180,6 +187,7 @@ fn what_makes_no_sense_is_refused() {
         ("version a.tetdb diff base other", "no-such-part", 3),
         ("digest a.tetdb --at-version other", "no-such-part", 3),
         ("info a.tetdb --at-version other", "no-such-part", 3),
+        ("field a.tetdb list --at-version other", "no-such-part", 3),
         ("version u.tetdb save x", "store-unfinished", 8),
         ("version b.tetdb save x", "no-such-store", 3),
     ] {

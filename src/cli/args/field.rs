@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::run::ReadArgs;
+use super::run::{AtArgs, ReadArgs};
 use super::words::word_of;
 use tetdb_engine::api::{FieldNumber, FieldPlace};
 
@@ -28,7 +28,7 @@ pub enum FieldAction {
     /// Ctrl-C leaves the store as it was.
     Add(AddFieldArgs),
     /// List the fields with type, bytes and range
-    List(ReadArgs),
+    List(ListFieldsArgs),
     /// Drop a field with all its values
     Drop(DropFieldArgs),
 }
@@ -60,6 +60,14 @@ pub struct AddFieldArgs {
 }
 
 #[derive(Debug, clap::Args)]
+pub struct ListFieldsArgs {
+    #[command(flatten)]
+    pub at: AtArgs,
+    #[command(flatten)]
+    pub read: ReadArgs,
+}
+
+#[derive(Debug, clap::Args)]
 pub struct DropFieldArgs {
     /// Its name
     #[arg(value_name = "NAME")]
@@ -73,7 +81,7 @@ impl FieldArgs {
     pub fn is_json(&self) -> bool {
         match &self.action {
             FieldAction::Add(args) => args.read.json,
-            FieldAction::List(args) => args.json,
+            FieldAction::List(args) => args.read.json,
             FieldAction::Drop(args) => args.read.json,
         }
     }

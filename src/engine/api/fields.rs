@@ -69,6 +69,16 @@ impl FieldValues {
         numbers.into_iter().map(|n| packed(number, n)).collect()
     }
 
+    /// Type and count of the numbers.
+    fn kind(&self) -> (FieldNumber, usize) {
+        match self {
+            Self::F32(list) => (FieldNumber::F32, list.len()),
+            Self::F64(list) => (FieldNumber::F64, list.len()),
+            Self::I32(list) => (FieldNumber::I32, list.len()),
+            Self::I64(list) => (FieldNumber::I64, list.len()),
+        }
+    }
+
     fn unpack(number: FieldNumber, words: &[u64]) -> Self {
         let int = |&word: &u64| word as i64;
         match number {
@@ -124,8 +134,8 @@ impl Store {
         })
     }
 
-    /// Adds a field with values that `fill` gives for each chunk: those of the sub-domain's vertices or tetrahedra, by number. Type and
-    /// components must be set, or are `f64` and 1.
+    /// Adds a field with values that `fill` gives for each chunk, once: those of the sub-domain's vertices or tetrahedra, by number. Type
+    /// and components are those of the first chunk's values where they are not set.
     ///
     /// ```
     /// # use tetdb_engine::api as tetdb;
@@ -152,9 +162,19 @@ impl Store {
         mut fill: impl FnMut(&mut Subdomain, u32) -> Result<FieldValues, Error>,
     ) -> Result<Field, Error> {
         self.change_fields(|catalog, settings| {
-            let number = new.number.unwrap_or(FieldNumber::F64);
-            let row = new.row(number, new.components.unwrap_or(1))?;
-            add(catalog, settings, row, &mut |mesh, chunk| fill(mesh, chunk)?.pack(number))
+            check_is_new(catalog, &new.name)?;
+            new.row(FieldNumber::F64, new.components.unwrap_or(1))?;
+            let mut mesh = catalog.open_subdomain(0, CACHE_BYTES)?;
+            let mut first = Some(fill(&mut mesh, 0)?);
+            let (number, n) = first.as_ref().map_or((FieldNumber::F64, 0), FieldValues::kind);
+            let count = count_of(&mesh, new.place, 0).max(1) as usize;
+            let number = new.number.unwrap_or(number);
+            let row = new.row(number, new.components.unwrap_or((n / count) as u32))?;
+            drop(mesh);
+            add(catalog, settings, row, &mut |mesh, chunk| {
+                let values = first.take().map_or_else(|| fill(mesh, chunk), Ok);
+                values?.pack(number)
+            })
         })
     }
 
@@ -244,6 +264,23 @@ pub(super) fn journal(
     JournalRow { state, subdomain, step: step.to_owned(), seconds, measures }
 }
 
+/// Errors: the store has a field of that name.
+fn check_is_new(catalog: &mut Catalog, name: &str) -> Result<(), Error> {
+    match catalog.fields()?.iter().any(|field| field.name == name) {
+        true => Err(bad(format!("there is a field {name} already"))
+            .with_help("drop it first, or take another name")),
+        false => Ok(()),
+    }
+}
+
+/// Number of values in a chunk.
+fn count_of(mesh: &Subdomain, place: FieldPlace, chunk: usize) -> u32 {
+    match place {
+        FieldPlace::Tets => mesh.tet_summaries()[chunk].count,
+        FieldPlace::Vertices => mesh.vertex_summaries()[chunk].count,
+    }
+}
+
 /// Writes the values of a field and lists them in one commit.
 pub(super) fn add(
     catalog: &mut Catalog,
@@ -252,10 +289,7 @@ pub(super) fn add(
     words: &mut Words,
 ) -> Result<Field, Error> {
     let clock = Instant::now();
-    if catalog.fields()?.iter().any(|other| other.name == field.name) {
-        let message = format!("there is a field {} already", field.name);
-        return Err(bad(message).with_help("drop it first, or take another name"));
-    }
+    check_is_new(catalog, &field.name)?;
     let (id, serial) = catalog.next_field()?;
     field.id = id;
     let memory = (settings.cap()? / 8).clamp(FILE_BYTES[0], FILE_BYTES[1]) as usize;
@@ -302,10 +336,7 @@ fn write_parts(
         };
         for chunk in 0..n_chunks as u32 {
             check_cancelled();
-            let count = match field.place {
-                FieldPlace::Tets => mesh.tet_summaries()[chunk as usize].count,
-                FieldPlace::Vertices => mesh.vertex_summaries()[chunk as usize].count,
-            };
+            let count = count_of(&mesh, field.place, chunk as usize);
             let values = words(&mut mesh, chunk)?;
             let expected = count as usize * field.components as usize;
             if values.len() != expected {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::error::Remedy;
 use super::field_spec::NewField;
 use super::fields;
 use super::mesher::verify_new;
@@ -254,6 +255,7 @@ fn in_terms_of_meshes(error: tetdb_io::read::ReadError) -> Error {
         Code::UnsupportedContent => error.with_help(
             "write the mesh with tetrahedra alone in the volume, for example as .vtu or .msh of version 4.1",
         ),
+        Code::BadField => error.with_remedy(Remedy::General),
         _ => error,
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
-use super::{Error, FieldPlace, Store, guarded};
+use super::{Error, Store, guarded};
 use tetdb_io::write::{self, Content, ElementOrder, ExportSelection};
 pub use tetdb_io::write::{ENDINGS as MESH_ENDINGS, MeshFormat, Share, Writers};
 use tetdb_store::store::Catalog;
@@ -178,14 +178,16 @@ impl Store {
         selection: &ExportSelection,
     ) -> Result<(), Error> {
         let format = write::check(out, selection)?;
-        let has_vertices = selection.order == ElementOrder::First && !selection.split_sheets;
+        let has_midpoints = selection.order == ElementOrder::Second;
         let parts = catalog.field_parts()?;
         let mut lacking: Vec<(&str, Vec<String>)> = Vec::new();
         for field in catalog.fields()? {
             let why = if !format.has_fields() {
                 FIELD_FORMATS
-            } else if field.place == FieldPlace::Vertices && !has_vertices {
+            } else if !write::has_values_at(&field, false, selection.split_sheets) {
                 "it has vertices that the store does not have"
+            } else if !write::has_values_at(&field, has_midpoints, false) {
+                "integers have no means at the middles of edges"
             } else if format.has_doubles() && !write::fits_doubles(&field, &parts) {
                 "doubles do not hold all of these integers"
             } else {

@@ -119,6 +119,16 @@ pub enum ReadFault {
         /// Why it cannot be right.
         found: String,
     },
+    /// A field cannot hold a value of an array.
+    #[error("value {row} of the array {array:?} has a number that the type {number} does not hold")]
+    FieldValue {
+        /// Name of the array.
+        array: String,
+        /// Place of the value in the array, from 0.
+        row: u64,
+        /// Type of the field.
+        number: &'static str,
+    },
     /// A coordinate is too large to compute with exactly.
     #[error("a coordinate is too large to compute with exactly: {0:e}, expected below 1e30")]
     CoordinateRange(f64),
@@ -163,6 +173,7 @@ impl ReadError {
             ReadFault::NotANumber { .. } => Code::NotANumber,
             ReadFault::IndexOutOfRange { .. } => Code::IndexOutOfRange,
             ReadFault::CountMismatch { .. } => Code::CountMismatch,
+            ReadFault::FieldValue { .. } => Code::BadField,
             ReadFault::CoordinateRange(_) => Code::CoordinateRange,
             ReadFault::Unsupported(_) => Code::UnsupportedContent,
             ReadFault::Empty => Code::EmptySurface,
@@ -201,6 +212,9 @@ impl ReadError {
             }
             ReadFault::CountMismatch { .. } => {
                 "write the file again from the program it comes from; the counts must match what follows"
+            }
+            ReadFault::FieldValue { .. } => {
+                "leave the arrays of values out, or write this one with numbers of type float64"
             }
             ReadFault::CoordinateRange(_) => {
                 "scale the surface to ordinary units, for example metres"

@@ -27,7 +27,14 @@ pub(super) fn write(
 ) -> Result<FileCounts> {
     let midpoints = match selection.order {
         ElementOrder::First => None,
-        ElementOrder::Second => Some(Midpoints::gather(mesh, format == MeshFormat::Gmsh)?),
+        ElementOrder::Second => {
+            let has_fields = format.has_fields() && selection.content == Content::Mesh;
+            let [fields, _] = match has_fields {
+                true => mesh.fields_read(true, format.has_doubles())?,
+                false => Default::default(),
+            };
+            Some(Midpoints::gather(mesh, format == MeshFormat::Gmsh, &fields)?)
+        }
     };
     let midpoints = midpoints.as_ref();
     let periodic = match selection.has_periodic(format) {

@@ -12,7 +12,7 @@ use super::doubles::Doubles;
 use super::embedded::{WrittenEmbedded, memory_left};
 use super::error::{Result, WriteError};
 use super::faces::{FaceSorter, FaceSource, MergedFace, MergedFaces};
-use super::merged_fields::{FieldChunk, fits_doubles, open_fields};
+use super::merged_fields::{FieldChunk, fits_doubles, has_values_at, open_fields};
 use super::merged_parts::{collect_faces, misplaced, required_faces, sources};
 use super::numbering::{Numbering, PartNumbers, Sharer, Source, shareable_vertices, sharers};
 use super::read_progress::ReadProgress;
@@ -153,22 +153,29 @@ impl<'a> Merged<'a> {
         Ok(mesh)
     }
 
-    /// Reads the fields with all later passes, and returns those at vertices and at tetrahedra. Vertices that are not in the store
-    /// have no values, so with them fields at vertices are left out; with `as_doubles`, those whose integers no double holds. Errors: damage.
-    pub fn read_fields(
+    /// The fields at vertices and at tetrahedra that are written: at vertices none where some are doubled, with midpoints only those that
+    /// have means; with `as_doubles`, none whose integers no double holds. Errors: damage.
+    pub fn fields_read(
         &mut self,
-        has_more_vertices: bool,
+        has_midpoints: bool,
         as_doubles: bool,
     ) -> Result<[Vec<FieldRow>; 2]> {
         let parts = self.store.field_parts()?;
         let mut fields = self.store.fields()?;
         fields.retain(|field| !as_doubles || fits_doubles(field, &parts));
-        let (vertices, tets) =
+        let (mut vertices, tets): (Vec<_>, _) =
             fields.into_iter().partition(|field| field.place == FieldPlace::Vertices);
-        self.fields = match has_more_vertices || self.doubles.is_some() {
-            true => [Vec::new(), tets],
-            false => [vertices, tets],
-        };
+        vertices.retain(|field| has_values_at(field, has_midpoints, self.doubles.is_some()));
+        Ok([vertices, tets])
+    }
+
+    /// As [`Merged::fields_read`], and reads those at tetrahedra with all later passes. Errors: damage.
+    pub fn read_fields(
+        &mut self,
+        has_midpoints: bool,
+        as_doubles: bool,
+    ) -> Result<[Vec<FieldRow>; 2]> {
+        self.fields = self.fields_read(has_midpoints, as_doubles)?;
         Ok(self.fields.clone())
     }
 

@@ -1,7 +1,7 @@
 //! Values of fields beside the vertices and tetrahedra of a merged mesh.
 
 use super::error::Result;
-use tetdb_schema::field::{FieldNumber, FieldPart, FieldRow};
+use tetdb_schema::field::{FieldNumber, FieldPart, FieldPlace, FieldRow};
 use tetdb_store::sealed::{FieldFile, Subdomain};
 use tetdb_store::store::Catalog;
 
@@ -32,6 +32,12 @@ pub(super) fn open_fields(
     part: &Subdomain,
 ) -> Result<Vec<FieldFile>> {
     fields.iter().map(|field| Ok(store.open_field(field, part, FIELD_BYTES)?)).collect()
+}
+
+/// Returns whether a field has values at all vertices that are written, also at midpoints of edges and at doubles of vertices on sheets.
+pub fn has_values_at(field: &FieldRow, has_midpoints: bool, has_doubles: bool) -> bool {
+    let has_means = !field.number.is_integer();
+    field.place == FieldPlace::Tets || (!has_doubles && (!has_midpoints || has_means))
 }
 
 /// Returns whether doubles hold all values of a field. Ranges are rounded, so 2^53 itself is not let through.

@@ -1,13 +1,17 @@
 //! Midpoints of edges, for elements of second order: each edge has one, and the ends of the edges number them.
 //!
-//! A midpoint is half of one end plus half of the other, so that it has the same bits in every file.
+//! Positions, and values of fields, are the means of both ends.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use super::edge_means::{
+    EdgeEnds, HalfEdge, MidpointReader, MidpointValues, ValueGroup, save_means,
+};
 use super::error::Result;
 use super::merged::Merged;
-use super::stream::{RecordReader, scratch};
+use super::stream::{RecordReader, Stream, scratch};
 use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
+use tetdb_schema::field::FieldRow;
 use tetdb_store::sealed::MergeReader;
 
 /// The edges of a tetrahedron in VTK's and Abaqus's order of midpoints.
@@ -30,30 +34,6 @@ sort_record! {
 }
 
 sort_record! {
-    /// An edge by its second end, with the position of its first end.
-    struct HalfEdge {
-        high: u64,
-        edge: u64,
-        low_point: Payload<[f64; 3]>,
-    }
-}
-
-sort_record! {
-    /// The midpoint of an edge.
-    struct Midpoint {
-        edge: u64,
-        position: Payload<[f64; 3]>,
-    }
-}
-
-sort_record! {
-    /// A midpoint in the scratch file, where its place is its number.
-    struct Position {
-        position: Payload<[f64; 3]>,
-    }
-}
-
-sort_record! {
     /// The number of an element's edge.
     struct EdgeNumber {
         place: u64,
@@ -70,25 +50,29 @@ pub(super) struct Midpoints {
     /// Edges of the tetrahedra, six each, then of the boundary faces, three each, then embedded ones; 8 bytes for each number.
     elements: PathBuf,
     points: PathBuf,
+    values: Vec<ValueGroup>,
 }
 
 impl Midpoints {
-    /// Numbers the midpoints, in two passes over vertices and one over tetrahedra; with `has_lines` also those of embedded edges. Errors: damage, the disk.
-    pub fn gather(mesh: &mut Merged, has_lines: bool) -> Result<Self> {
+    /// Numbers the midpoints, in two passes over vertices and one over tetrahedra; with `has_lines` also those of embedded edges. Each three
+    /// numbers of `fields` at vertices take two passes more. Errors: damage, the disk.
+    pub fn gather(mesh: &mut Merged, has_lines: bool, fields: &[FieldRow]) -> Result<Self> {
         let [points, elements] = ["midpoints", "edges"].map(|name| mesh.dir().join(name));
         let edges = element_edges(mesh, has_lines)?;
-        let (counts, halves, numbers) = numbered(mesh, edges)?;
-        let mut stream = scratch(&points)?;
-        for midpoint in positions(mesh, halves)? {
-            stream.record(&Position { position: midpoint?.position })?;
-        }
-        stream.finish()?;
+        let ends = (!fields.is_empty()).then(|| mesh.dir().join("edge-ends"));
+        let (counts, halves, numbers) = numbered(mesh, edges, ends.as_deref())?;
+        save_means(mesh, halves, &points, &[], |vertex, _| vertex.point)?;
         let mut stream = scratch(&elements)?;
         for number in numbers {
             stream.record(&number?.edge.to_le_bytes())?;
         }
         stream.finish()?;
-        Ok(Self { counts, n_tets: mesh.n_tets(), n_faces: mesh.n_faces(), elements, points })
+        let values = match ends {
+            Some(ends) => ValueGroup::gather(mesh, fields, &ends)?,
+            None => Vec::new(),
+        };
+        let (n_tets, n_faces) = (mesh.n_tets(), mesh.n_faces());
+        Ok(Self { counts, n_tets, n_faces, elements, points, values })
     }
 
     /// Number of midpoints.
@@ -122,7 +106,21 @@ impl Midpoints {
 
     /// Positions of the midpoints, in the order of their numbers. Errors: the disk.
     pub fn points(&self) -> Result<MidpointReader> {
-        Ok(MidpointReader(RecordReader::open(&self.points, 0)?))
+        MidpointReader::open(&self.points)
+    }
+
+    /// Opens the values of some of the gathered fields. Errors: the disk.
+    pub fn values(&self, fields: &[FieldRow]) -> Result<MidpointValues> {
+        MidpointValues::open(&self.values, fields)
+    }
+
+    /// Position and words of the values of some fields at each midpoint, in the order of their numbers. Errors: the disk.
+    pub fn rows(
+        &self,
+        fields: &[FieldRow],
+    ) -> Result<impl Iterator<Item = Result<([f64; 3], Vec<u64>)>> + use<>> {
+        let (points, mut values) = (self.points()?, self.values(fields)?);
+        Ok((0..).zip(points).map(move |(edge, point)| Ok((point?, values.at(edge)?))))
     }
 }
 
@@ -147,26 +145,6 @@ impl<const N: usize> ElementEdges<N> {
     pub fn element(&mut self, element: u64) -> Result<[u64; N]> {
         self.records.seek(self.first + N as u64 * element)?;
         self.next()
-    }
-}
-
-/// Positions of midpoints in the order of their numbers.
-pub(super) struct MidpointReader(RecordReader<Position>);
-
-impl MidpointReader {
-    /// The midpoint of the edge with this number. Errors: the disk.
-    pub fn at(&mut self, edge: u64) -> Result<[f64; 3]> {
-        self.0.seek(edge)?;
-        self.next().expect("every edge has its midpoint")
-    }
-}
-
-impl Iterator for MidpointReader {
-    type Item = Result<[f64; 3]>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let midpoint = self.0.next().transpose()?;
-        Some(midpoint.map(|midpoint| midpoint.position.0))
     }
 }
 
@@ -201,8 +179,13 @@ fn element_edges(mesh: &mut Merged, has_lines: bool) -> Result<Sorted<ElementEdg
 /// Number of edges of each sub-domain, the edges with the positions of their first ends, and the number of each element's edge.
 type NumberedEdges = (Vec<u64>, Sorted<HalfEdge>, Sorted<EdgeNumber>);
 
-/// Numbers the edges by their ends.
-fn numbered(mesh: &mut Merged, edges: Sorted<ElementEdge>) -> Result<NumberedEdges> {
+/// Numbers the edges by their ends, and writes these to the file `ends` if there is one.
+fn numbered(
+    mesh: &mut Merged,
+    edges: Sorted<ElementEdge>,
+    ends: Option<&Path>,
+) -> Result<NumberedEdges> {
+    let mut ends = ends.map(scratch).transpose()?;
     let mut edges = MergeReader::new(edges);
     let mut numbers = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     let mut halves = Sorter::new(mesh.dir(), mesh.sorter_bytes());
@@ -215,25 +198,14 @@ fn numbered(mesh: &mut Merged, edges: Sorted<ElementEdge>) -> Result<NumberedEdg
                 n += 1;
                 counts[firsts.partition_point(|&first| first <= number) - 1] += 1;
                 halves.push(HalfEdge { high, edge: n - 1, low_point: Payload(vertex.point) })?;
+                if let Some(ends) = &mut ends {
+                    ends.record(&EdgeEnds { low, high })?;
+                }
             }
             numbers.push(EdgeNumber { place, edge: n - 1 })?;
         }
         Ok(())
     })?;
+    ends.map(Stream::finish).transpose()?;
     Ok((counts, halves.finish()?, numbers.finish()?))
-}
-
-/// The midpoints by number, from the second ends of the edges.
-fn positions(mesh: &mut Merged, halves: Sorted<HalfEdge>) -> Result<Sorted<Midpoint>> {
-    let mut halves = MergeReader::new(halves);
-    let mut midpoints = Sorter::new(mesh.dir(), mesh.sorter_bytes());
-    mesh.vertices(|number, vertex| {
-        while let Some(half) = halves.next_if(|half| half.high == number)? {
-            let (a, b) = (half.low_point.0, vertex.point);
-            let position = Payload([0, 1, 2].map(|i| 0.5 * a[i] + 0.5 * b[i]));
-            midpoints.push(Midpoint { edge: half.edge, position })?;
-        }
-        Ok(())
-    })?;
-    Ok(midpoints.finish()?)
 }

@@ -14,6 +14,7 @@ mod array_file;
 mod columns;
 mod dispatch;
 mod doubles;
+mod edge_means;
 mod embedded;
 mod embedded_list;
 mod error;
@@ -70,7 +71,7 @@ use format::{
     FACES_ALONE, GHOSTS, PARTITIONS, REGIONS, REGIONS_APART, SECOND_ORDER, SLITS, STREAM,
     SUBDOMAINS, TEXT,
 };
-pub use merged_fields::fits_doubles;
+pub use merged_fields::{fits_doubles, has_values_at};
 pub use npy::TextFile;
 pub use npy::bytes;
 pub use npy::{NpyField, NpyTable};

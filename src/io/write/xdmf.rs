@@ -113,8 +113,9 @@ impl Arrays {
             vertices.row(&(vertex.id as i64, words.to_vec()), vertex.point.map(f64::to_bits))
         })?;
         if let Some(midpoints) = midpoints {
-            for point in midpoints.points()? {
-                vertices.row(&(NO_ID, Vec::new()), point?.map(f64::to_bits))?;
+            for row in midpoints.rows(fields)? {
+                let (point, words) = row?;
+                vertices.row(&(NO_ID, words), point.map(f64::to_bits))?;
             }
         }
         vertices.finish()?;

@@ -1,6 +1,7 @@
 //! Why something was not done, on its way to an exception.
 
 use pyo3::prelude::*;
+use tetdb::Code;
 use tetdb::data::SealedError;
 
 /// What an exception says: the library's error, or the end of a thread.
@@ -18,6 +19,16 @@ impl Failure {
             message: message.to_owned(),
             place: None,
             help: Some("this is a bug; please report the call and this message".to_owned()),
+        }
+    }
+
+    /// A question to a store while a callable gives the values of a new field of it.
+    pub fn busy() -> Self {
+        Self {
+            code: Code::Busy.to_string(),
+            message: "a callable gives the values of a new field of this store".to_owned(),
+            place: None,
+            help: Some("ask when the field is added, or ask another store".to_owned()),
         }
     }
 

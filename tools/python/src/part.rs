@@ -1,5 +1,6 @@
 //! A sub-domain as arrays: each chunk is decoded into the array that is returned.
 
+use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
@@ -22,7 +23,7 @@ pub struct Part {
 }
 
 /// A vertex that no tetrahedron of the block has.
-const NOT_IN_BLOCK: u32 = u32::MAX;
+const NOT_IN_BLOCK: i32 = -1;
 /// Words of a facet and of an interface face.
 const FACET_WORDS: usize = 10;
 const FACE_WORDS: usize = 7;
@@ -166,107 +167,123 @@ impl Part {
     }
 
     /// Tetrahedra `first..first + count` with their own points: points, vertex ids, tetrahedra, regions.
-    #[expect(clippy::type_complexity, reason = "what Python takes apart at once")]
     fn block<'py>(
         &self,
         py: Python<'py>,
         first: usize,
         count: usize,
-    ) -> PyResult<(
-        Bound<'py, PyArray2<f64>>,
-        Bound<'py, PyArray1<i64>>,
-        Bound<'py, PyArray2<i32>>,
-        Bound<'py, PyArray1<i32>>,
-    )> {
-        let end = first.saturating_add(count).min(self.n_tets);
-        let n = end.saturating_sub(first);
-        let tets = PyArray2::zeros(py, [n, 4], false);
-        let regions = PyArray1::zeros(py, n, false);
+    ) -> PyResult<BlockArrays<'py>> {
+        let range = first..first.saturating_add(count).min(self.n_tets);
         let token = CancelToken::new();
-        let (points, ids);
-        {
-            let (mut tets, mut regions) = (tets.readwrite(), regions.readwrite());
-            let (tets, regions) = (tets.as_slice_mut()?, regions.as_slice_mut()?);
-            let (places, n_points) = watched(py, &token, None, || {
-                tets_of_block(&mut self.lock(), first..end, (&mut *tets, regions), &token)
-            })?;
-            points = PyArray2::zeros(py, [n_points, 3], false);
-            ids = PyArray1::zeros(py, n_points, false);
-            let (mut points, mut ids) = (points.readwrite(), ids.readwrite());
-            let (points, ids) = (points.as_slice_mut()?, ids.as_slice_mut()?);
-            watched(py, &token, None, || {
-                points_of_block(&mut self.lock(), &places, (points, ids), &token)?;
-                let place = |v: &mut i32| *v = places[*v as usize].cast_signed();
-                tets.iter_mut().for_each(place);
-                Ok(())
-            })?;
-        }
-        Ok((points, ids, tets, regions))
+        let read = || Ok(Block::read(&mut self.lock(), range, &token)?);
+        watched(py, &token, None, read)?.arrays(py)
     }
 }
 
-/// Reads tetrahedra; returns for each vertex its place in the block, and how many have one.
-fn tets_of_block(
-    part: &mut Subdomain,
-    range: std::ops::Range<usize>,
-    (tets, regions): (&mut [i32], &mut [i32]),
-    token: &CancelToken,
-) -> Result<(Vec<u32>, usize), Failure> {
-    let mut places = vec![NOT_IN_BLOCK; part.row().vertices as usize];
-    let (mut chunk_first, mut done) = (0, 0);
-    for chunk in 0..part.tet_summaries().len() {
-        let chunk_end = chunk_first + part.tet_summaries()[chunk].count as usize;
-        if chunk_end > range.start && chunk_first < range.end {
+/// Points (n, 3), vertex ids (n), tetrahedra (m, 4) that name rows of points, regions (m).
+pub type BlockArrays<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray2<i32>>,
+    Bound<'py, PyArray1<i32>>,
+);
+
+/// Consecutive tetrahedra with their own points.
+#[derive(Default)]
+pub struct Block {
+    points: Vec<f64>,
+    ids: Vec<i64>,
+    tets: Vec<i32>,
+    regions: Vec<i32>,
+}
+
+impl Block {
+    /// Reads tetrahedra by number, and each chunk of vertices that has corners of theirs once. Errors: damage; `token`.
+    pub fn read(
+        part: &mut Subdomain,
+        range: Range<usize>,
+        token: &CancelToken,
+    ) -> Result<Self, tetdb::Error> {
+        let mut block = Self::default();
+        // The rows of the vertices of each chunk; empty where the block has none of them.
+        let mut rows = vec![Vec::new(); part.vertex_summaries().len()];
+        let mut firsts = Vec::with_capacity(rows.len());
+        let mut n = 0;
+        for summary in part.vertex_summaries() {
+            firsts.push(n);
+            n += summary.count;
+        }
+        block.read_tets(part, range, token)?;
+        if block.tets.iter().any(|v| v.cast_unsigned() >= n) {
+            return Err(part.damaged("a tetrahedron names no vertex").into());
+        }
+        let place = |part: &Subdomain, v: i32| {
+            let chunk = part.vertex_chunk_of(v.cast_unsigned());
+            (chunk, (v.cast_unsigned() - firsts[chunk]) as usize)
+        };
+        for &v in &block.tets {
+            let (chunk, i) = place(part, v);
+            let of_chunk = &mut rows[chunk];
+            of_chunk.resize(part.vertex_summaries()[chunk].count as usize, NOT_IN_BLOCK);
+            of_chunk[i] = 0;
+        }
+        for (chunk, rows) in rows.iter_mut().enumerate().filter(|(_, rows)| !rows.is_empty()) {
             if token.is_cancelled() {
-                return Err(Failure::cancelled());
+                return Err(tetdb::Error::stopped());
             }
-            let records = part.tet_chunk(chunk as u32)?.records;
-            let from = range.start.saturating_sub(chunk_first);
-            let to = (range.end - chunk_first).min(records.len());
-            for SealedTet { nodes, region } in &records[from..to] {
-                tets[4 * done..4 * done + 4].copy_from_slice(&signed(*nodes));
-                regions[done] = region.cast_signed();
-                nodes.iter().for_each(|v| places[*v as usize] = 0);
-                done += 1;
+            let vertices = part.vertex_chunk(chunk as u32)?.records;
+            let all = rows.iter_mut().zip(&vertices);
+            for (row, vertex) in all.filter(|(row, _)| **row != NOT_IN_BLOCK) {
+                *row = block.ids.len() as i32;
+                block.points.extend(vertex.point);
+                block.ids.push(vertex.id.cast_signed());
             }
         }
-        chunk_first = chunk_end;
+        for v in &mut block.tets {
+            let (chunk, i) = place(part, *v);
+            *v = rows[chunk][i];
+        }
+        Ok(block)
     }
-    let mut n_points = 0;
-    for place in places.iter_mut().filter(|place| **place == 0) {
-        *place = n_points;
-        n_points += 1;
-    }
-    Ok((places, n_points as usize))
-}
 
-/// Reads the vertices that have a place, each chunk of them at most once.
-fn points_of_block(
-    part: &mut Subdomain,
-    places: &[u32],
-    (points, ids): (&mut [f64], &mut [i64]),
-    token: &CancelToken,
-) -> Result<(), Failure> {
-    let mut first = 0;
-    for chunk in 0..part.vertex_summaries().len() {
-        let end = first + part.vertex_summaries()[chunk].count as usize;
-        let places = &places[first..end];
-        first = end;
-        if places.iter().all(|place| *place == NOT_IN_BLOCK) {
-            continue;
+    /// Reads tetrahedra that name vertices of the sub-domain.
+    fn read_tets(
+        &mut self,
+        part: &mut Subdomain,
+        range: Range<usize>,
+        token: &CancelToken,
+    ) -> Result<(), tetdb::Error> {
+        self.tets.reserve_exact(4 * range.len());
+        self.regions.reserve_exact(range.len());
+        let mut first = 0;
+        for chunk in 0..part.tet_summaries().len() {
+            let end = first + part.tet_summaries()[chunk].count as usize;
+            if end > range.start && first < range.end {
+                if token.is_cancelled() {
+                    return Err(tetdb::Error::stopped());
+                }
+                let records = part.tet_chunk(chunk as u32)?.records;
+                let from = range.start.saturating_sub(first);
+                let to = (range.end - first).min(records.len());
+                for SealedTet { nodes, region } in &records[from..to] {
+                    self.tets.extend(signed(*nodes));
+                    self.regions.push(region.cast_signed());
+                }
+            }
+            first = end;
         }
-        if token.is_cancelled() {
-            return Err(Failure::cancelled());
-        }
-        let vertices = part.vertex_chunk(chunk as u32)?.records;
-        let all = places.iter().zip(&vertices);
-        for (place, vertex) in all.filter(|(place, _)| **place != NOT_IN_BLOCK) {
-            let place = *place as usize;
-            points[3 * place..3 * place + 3].copy_from_slice(&vertex.point);
-            ids[place] = vertex.id.cast_signed();
-        }
+        Ok(())
     }
-    Ok(())
+
+    pub fn arrays(self, py: Python<'_>) -> PyResult<BlockArrays<'_>> {
+        let (n, m) = (self.ids.len(), self.regions.len());
+        Ok((
+            PyArray1::from_vec(py, self.points).reshape([n, 3])?,
+            PyArray1::from_vec(py, self.ids),
+            PyArray1::from_vec(py, self.tets).reshape([m, 4])?,
+            PyArray1::from_vec(py, self.regions),
+        ))
+    }
 }
 
 /// Qualities of tetrahedra that name rows of `points`.

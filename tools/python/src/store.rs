@@ -1,12 +1,13 @@
 //! A finished store: questions, files, pictures, sub-domains again.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde_json::json;
-use tetdb::data::Hit;
+use tetdb::data::{Hit, Subdomain};
 use tetdb::{
     CancelToken, ColorBy, ErrorEstimate, ExportOptions, FieldIds, FieldPlace, FieldSource,
     MotionKind, NewField, Order, PeriodicLabels, Snapshot, TransferMethod, VerifyLevel, Word,
@@ -14,7 +15,7 @@ use tetdb::{
 
 use crate::arrow::ArrowStream;
 use crate::failure::Failure;
-use crate::field::Field;
+use crate::field::{Field, FieldCallable};
 use crate::part::Part;
 use crate::run::SettingWords;
 use crate::sizes::SizeWords;
@@ -31,6 +32,8 @@ pub struct Store {
     settings: SettingWords,
     token: CancelToken,
     session: Mutex<Option<tetdb::Store>>,
+    /// Set while a callable gives values: it would wait for ever for the session.
+    is_filled: AtomicBool,
     /// The process that opened it: threads and locks of a session are not there in a child.
     process: u32,
 }
@@ -115,13 +118,21 @@ impl Store {
         watched(py, &token, None, || work(self.opened(&token)?))
     }
 
+    /// The session, when no other question or change has it.
+    fn session(&self) -> Result<MutexGuard<'_, Option<tetdb::Store>>, Failure> {
+        match self.is_filled.load(Ordering::Acquire) {
+            true => Err(Failure::busy()),
+            false => Ok(self.session.lock().unwrap_or_else(PoisonError::into_inner)),
+        }
+    }
+
     fn in_session<T: Send>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&mut tetdb::Store) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         watched(py, &self.token, None, || {
-            let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut session = self.session()?;
             if session.is_none() {
                 *session = Some(self.opened(&self.token)?);
             }
@@ -139,7 +150,7 @@ impl Store {
         let (token, board) = (CancelToken::new(), Arc::new(Board::default()));
         let listener = Listener { board: &board, callable };
         watched(py, &token, Some(&listener), || {
-            let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut session = self.session()?;
             *session = None;
             let settings = self.settings.settings(&token, Some(&board));
             work(tetdb::Store::open_with(&self.path, settings)?)
@@ -166,6 +177,7 @@ impl Store {
             settings,
             token: CancelToken::new(),
             session: Mutex::new(None),
+            is_filled: AtomicBool::new(false),
             process: std::process::id(),
         };
         store.in_session(py, |_| Ok(()))?;
@@ -173,10 +185,12 @@ impl Store {
     }
 
     /// Closes the session; the next question opens another.
-    fn close(&self, py: Python<'_>) {
-        py.detach(|| {
-            *self.session.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        let closed = py.detach(|| {
+            *self.session()? = None;
+            Ok(())
         });
+        closed.map_err(|failure: Failure| failure.raised(py))
     }
 
     /// What the store holds, as JSON.
@@ -444,6 +458,26 @@ impl Store {
         self.changed(py, None, move |mut store| {
             Ok(store.add_field_from(&new, &source).map(drop)?)
         })
+    }
+
+    /// Adds a field with the values that a callable gives for each chunk; what that raises is raised here.
+    fn fill_field(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        at: &str,
+        callable: Py<PyAny>,
+    ) -> PyResult<()> {
+        let place = FieldPlace::from_word(at).unwrap_or(FieldPlace::Vertices);
+        let mut callable = FieldCallable { callable, raised: None };
+        let done = self.changed(py, None, |mut store| {
+            self.is_filled.store(true, Ordering::Release);
+            let fill = |mesh: &mut Subdomain, chunk| callable.values(mesh, chunk, place);
+            let added = store.add_field(&NewField::new(name, place), fill);
+            self.is_filled.store(false, Ordering::Release);
+            Ok(added.map(drop)?)
+        });
+        callable.raised.map_or(done, Err)
     }
 
     fn drop_field(&self, py: Python<'_>, name: &str) -> PyResult<()> {

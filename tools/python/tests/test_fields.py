@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,64 @@ def test_arrays_come_back(st: tetdb.Store) -> None:
     assert st.fields["e"].digest == field.digest
     hits = st.query("T > 300.9 and mark >= 0")
     assert len(hits) and (hits["centroid"][:, 0] > 0.9).all()
+
+
+def test_callables_give_values_chunk_by_chunk(parts: tetdb.Store, tmp_path: Path) -> None:
+    shutil.copytree(parts.path, tmp_path / "a.tetdb")
+    with tetdb.open(tmp_path / "a.tetdb") as st:
+        calls = []
+
+        def linear(points: np.ndarray) -> np.ndarray:
+            assert not points.flags.writeable
+            calls.append(len(points))
+            return 300 + points[:, 0]
+
+        st.fields["T"] = linear
+        assert sum(calls) == sum(part.n_points for part in st.subdomains)
+        assert calls == [len(chunk) for chunk in st.fields["T"].chunks()]
+        st.fields.add("E", "300 + x")
+        assert st.fields["T"].digest == st.fields["E"].digest
+        st.fields["u"] = lambda points: points.astype("f4") @ np.diag([1, 2, 3]).astype("f4")
+        assert (st.fields["u"].components, st.fields["u"].dtype) == (3, np.dtype("f4"))
+        st.fields.add("q", lambda chunk: chunk.quality, at="tets")
+        assert np.array_equal(st.fields["q"].array(1), st.subdomain(1).quality)
+        st.fields.add("number", lambda chunk: chunk.ids, at="tets")
+        st.fields.add("v", lambda chunk: chunk.vertex_ids[chunk.tets[:, :3]], at="tets")
+        part = st.subdomain(1)
+        assert np.array_equal(st.fields["number"].array(1), part.ids)
+        assert np.array_equal(st.fields["v"].array(1), part.vertex_ids[part.tets[:, :3]])
+        assert sum(st.fields["number"].array() >> 29) == st.subdomains[1].n_tets
+
+
+def test_what_a_callable_raises_is_raised(st: tetdb.Store) -> None:
+    class Own(Exception):
+        pass
+
+    error = Own("no")
+
+    def raising(_: object) -> np.ndarray:
+        raise error
+
+    for at in ("vertices", "tets"):
+        with pytest.raises(Own) as raised:
+            st.fields.add("T", raising, at=at)
+        assert raised.value is error and raised.traceback[-1].name == "raising"
+    for values in [lambda p: 1.0, lambda p: p[1:, 0], lambda p: p[:, :2], lambda p: ["a"] * len(p)]:
+        with pytest.raises(tetdb.TetdbError) as bad:
+            st.fields["T"] = values
+        assert bad.value.code == "bad-field"
+    with pytest.raises(tetdb.TetdbError):
+        st.fields.add("T", lambda p: p[:, 0], ids=np.arange(3))
+    # The session is not free before the field is added.
+    asking = [lambda p: st.query("x > 2"), lambda p: st.close(), lambda p: st.fields.add("V", "x"), lambda p: st.undo()]
+    for values in asking:
+        with pytest.raises(tetdb.StoreBusy):
+            st.fields["T"] = values
+    assert not st.fields and st.verify().ok
+    st.fields["T"] = lambda points: points[:, 0]
+    with pytest.raises(tetdb.TetdbError) as bad:
+        st.fields["T"] = raising
+    assert bad.value.code == "bad-field"
 
 
 def test_dropping_and_refusing(st: tetdb.Store) -> None:

@@ -27,6 +27,9 @@ def test_pyvista_reads_stores(parts: tetdb.Store) -> None:
     assert grid.n_cells == parts.n_tets
     assert set(np.unique(grid.cell_data["subdomain"])) == {0, 1}
     assert grid.volume == pytest.approx(1.0)
+    quality = [parts.subdomain(rank).quality for rank in (0, 1)]
+    assert np.array_equal(grid.cell_data["quality"], np.concatenate(quality))
+    assert np.array_equal(pyvista.read(parts.path, subdomain=1).cell_data["quality"], quality[1])
     with pytest.raises(FileNotFoundError):
         pyvista.read(str(Path(parts.path).parent / "none.tetdb"))
 

@@ -26,6 +26,7 @@ pub fn kind(datatype: &Datatype) -> Option<&'static str> {
 /// Rows of an array of a file, read block by block.
 pub struct HdfRows {
     dataset: Dataset,
+    first: u64,
     next: u64,
     end: u64,
 }
@@ -33,7 +34,12 @@ pub struct HdfRows {
 impl HdfRows {
     /// So many rows from one on.
     pub fn new(dataset: Dataset, first: u64, rows: u64) -> Self {
-        Self { dataset, next: first, end: first.saturating_add(rows) }
+        Self { dataset, first, next: first, end: first.saturating_add(rows) }
+    }
+
+    /// Number of the first row.
+    pub fn first(&self) -> u64 {
+        self.first
     }
 
     /// The bytes of the next rows, low ones first; `None` at the end, or where data are damaged or missing.

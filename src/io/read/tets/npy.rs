@@ -9,6 +9,7 @@ use crate::read::error::Spot;
 use crate::read::feed::check_point;
 use crate::read::lengths::{ArrayFile, sides_of};
 use tetdb_base::geom::Point;
+use tetdb_schema::code::Code;
 use tetdb_schema::field::FieldPlace;
 
 /// The file of tetrahedra of a mesh that is named by one of its arrays, or by their common beginning.
@@ -93,17 +94,27 @@ fn values(
     let mut names: Vec<String> =
         listed.flatten().filter_map(|file| file.file_name().into_string().ok()).collect();
     names.sort();
+    let names: Vec<&str> = names
+        .iter()
+        .filter_map(|file| file.strip_prefix(base)?.strip_prefix('_')?.strip_suffix(".npy"))
+        .collect();
+    // Meshes whose names go on where the name of this one ends.
+    let is_mesh = |other: &&str| names.contains(&&*format!("{other}_points"));
+    let others: Vec<&str> =
+        names.iter().filter_map(|name| name.strip_suffix("_tets")).filter(is_mesh).collect();
+    let is_foreign = |name: &str| {
+        let mut rests = others.iter().filter_map(|other| name.strip_prefix(other));
+        rests.any(|rest| rest.starts_with('_'))
+    };
     let mut left_out = Vec::new();
-    for file in &names {
-        let name = file.strip_prefix(base).and_then(|rest| rest.strip_prefix('_'));
-        let Some(name) = name.and_then(|rest| rest.strip_suffix(".npy")) else { continue };
+    for &name in names.iter().filter(|name| !is_foreign(name)) {
         let own = ["points", "tets", "triangles", "region", "label"];
         if own.contains(&name) || [fields.part, fields.region].contains(&Some(name)) {
             continue;
         }
-        let path = tets.with_file_name(file);
+        let path = tets.with_file_name(format!("{base}_{name}.npy"));
         let is_wanted = fields.values.is_some_and(|takes| takes(name));
-        let found = if is_wanted { open(&path)? } else { None };
+        let found = if is_wanted { open_foreign(&path)? } else { None };
         let field = found.as_ref().and_then(|(rows, columns, kind, _)| {
             let place = match counts.map(|n| n == *rows) {
                 [true, false] => FieldPlace::Vertices,
@@ -112,18 +123,25 @@ fn values(
             };
             mesh.field(name, place, field_number(kind)?, *columns as usize)
         });
-        let (Some(field), Some((rows, columns, _, mut numbers))) = (field, found) else {
+        let (Some(field), Some((rows, _, _, numbers))) = (field, found) else {
             left_out.push(name);
             continue;
         };
-        let field = &mut mesh.fields[field];
-        for _ in 0..rows * columns {
-            field.words.push(numbers.word(field.number)?);
-        }
-        numbers.end()?;
+        mesh.values(field, numbers, rows)?;
     }
     mesh.leave_out(&left_out);
+    if !others.is_empty() {
+        mesh.notes.push(format!("arrays of other meshes were left out: {}", others.join(", ")));
+    }
     Ok(())
+}
+
+/// As [`open`]; `None` also for what is no array at all, for all files of that name are tried.
+fn open_foreign(path: &Path) -> Result<Option<(u64, u64, &'static str, Numbers)>> {
+    match open(path) {
+        Err(error) if error.code() != Code::UnreadableFile => Ok(None),
+        opened => opened,
+    }
 }
 
 fn vertex(corners: &mut Numbers, n: u64) -> Result<u32> {

@@ -255,11 +255,20 @@ impl Numbers {
     /// The next number, which must be whole.
     #[inline]
     pub fn integer(&mut self) -> Result<i64> {
-        let found = match &mut self.from {
+        self.next_integer()?.ok_or_else(|| {
+            let (expected, found) = (self.what.to_owned(), "a broken number".to_owned());
+            self.place.refuse(ReadFault::Unexpected { expected, found })
+        })
+    }
+
+    /// The next number; `None` for one that is not whole, or beyond 64 bits.
+    #[inline]
+    fn next_integer(&mut self) -> Result<Option<i64>> {
+        Ok(match &mut self.from {
             From::Text(feed) => {
                 feed.need_word(self.what)?;
                 if let Ok(x) = feed.parse::<i64>(self.what) {
-                    return Ok(x);
+                    return Ok(Some(x));
                 }
                 let x: f64 = feed.parse(self.what)?;
                 float(x)
@@ -273,23 +282,30 @@ impl Numbers {
                 None => return Err(self.too_short()),
             },
             From::Constant(number) => Some(*number),
-        };
-        found.ok_or_else(|| {
-            let (expected, found) = (self.what.to_owned(), "a broken number".to_owned());
-            self.place.refuse(ReadFault::Unexpected { expected, found })
         })
     }
 
-    /// The word of the next number in a field of such numbers.
-    pub fn word(&mut self, number: FieldNumber) -> Result<u64> {
-        let scalar = match number.is_integer() {
-            true => Scalar::Int(self.integer()?),
-            false => Scalar::Float(self.real()?),
-        };
-        number.pack(scalar).ok_or_else(|| {
-            let (expected, found) = (format!("a number of {}", number.word()), "another");
-            self.place.refuse(ReadFault::Unexpected { expected, found: found.to_owned() })
-        })
+    /// Adds the words of the next value of a field to `words`: so many numbers of a type. Errors: the type has no such number; the name of the
+    /// array and the value's place among these say where.
+    pub fn value(
+        &mut self,
+        (number, components): (FieldNumber, u32),
+        (array, row): (&str, u64),
+        words: &mut Vec<u64>,
+    ) -> Result<()> {
+        for _ in 0..components {
+            let next = match number.is_integer() {
+                true => self.next_integer()?.map(Scalar::Int),
+                false => Some(Scalar::Float(self.real()?)),
+            };
+            let Some(word) = next.and_then(|next| number.pack(next)) else {
+                let first = if let From::Hdf(hdf) = &self.from { hdf.rows.first() } else { 0 };
+                let (array, row, number) = (array.to_owned(), first + row, number.word());
+                return Err(self.place.refuse(ReadFault::FieldValue { array, row, number }));
+            };
+            words.push(word);
+        }
+        Ok(())
     }
 
     /// Ends reading. Errors: there are more numbers.

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::io::BufRead;
 
+use super::numbers::Numbers;
 use super::{Feed, ReadFault, Result};
 use tetdb_base::geom::{Point, counted};
 use tetdb_base::storage::{ScratchSpace, SpillVec, SpillVecBuilder, check_cancelled};
@@ -182,6 +183,18 @@ impl RawMesh {
         let words = self.space.builder_within(self.space.available() / 32);
         self.fields.push(RawField { name: name.to_owned(), place, number, components, words });
         Some(self.fields.len() - 1)
+    }
+
+    /// Reads `n` values of a field, with which `numbers` end. Errors: a number that its type does not have; fewer or more.
+    pub(super) fn values(&mut self, field: usize, mut numbers: Numbers, n: u64) -> Result<()> {
+        let mut row = Vec::new();
+        let field = &mut self.fields[field];
+        for i in 0..n {
+            row.clear();
+            numbers.value((field.number, field.components), (&field.name, i), &mut row)?;
+            row.iter().for_each(|&word| field.words.push(word));
+        }
+        numbers.end()
     }
 
     /// Notes arrays of values that no field holds, or that are not taken.

@@ -289,12 +289,8 @@ impl Grid {
             mesh.point(p);
         }
         numbers.end()?;
-        for (field, mut numbers) in self.taken_numbers(piece, taken, "PointData")? {
-            let field = &mut mesh.fields[field];
-            for _ in 0..piece.n_points * u64::from(field.components) {
-                field.words.push(numbers.word(field.number)?);
-            }
-            numbers.end()?;
+        for (field, numbers) in self.taken_numbers(piece, taken, "PointData")? {
+            mesh.values(field, numbers, piece.n_points)?;
         }
         Ok(())
     }
@@ -383,7 +379,12 @@ impl Grid {
             }
             let (region, part) = (next(&mut regions)?, next(&mut parts)?);
             let (label, ghost) = (next(&mut labels)?, next(&mut ghosts)?);
-            read_row(&mut values, mesh, &mut row)?;
+            row.clear();
+            for (field, numbers) in &mut values {
+                let field = &mesh.fields[*field];
+                let kind = (field.number, field.components);
+                numbers.value(kind, (&field.name, cell), &mut row)?;
+            }
             if ghost & 1 != 0 {
                 n_ghosts += 1;
                 continue;
@@ -426,18 +427,6 @@ fn vertex(vertices: &mut Numbers, n_points: u64) -> Result<u64> {
         let (low, high) = (0, n_points as i64 - 1);
         vertices.place().refuse(ReadFault::IndexOutOfRange { index, low, high })
     })
-}
-
-/// Reads the words of all fields of a cell.
-fn read_row(values: &mut [(usize, Numbers)], mesh: &RawMesh, row: &mut Vec<u64>) -> Result<()> {
-    row.clear();
-    for (field, numbers) in values {
-        let field = &mesh.fields[*field];
-        for _ in 0..field.components {
-            row.push(numbers.word(field.number)?);
-        }
-    }
-    Ok(())
 }
 
 /// Adds the words of a cell to their fields.

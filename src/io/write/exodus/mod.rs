@@ -58,21 +58,20 @@ fn nodes(
     plan: &Plan,
     (midpoints, fields): (Option<&Midpoints>, &[FieldRow]),
 ) -> Result<()> {
-    let put = |arrays: &mut ArrayFile, number: u64, point: [f64; 3]| -> Result<()> {
+    let put = |arrays: &mut ArrayFile, number: u64, point: [f64; 3], words: &[u64]| -> Result<()> {
+        for (&array, x) in plan.node_values.iter().zip(to_doubles(fields, words)) {
+            arrays.put(array, &x.to_be_bytes())?;
+        }
         for (&array, x) in plan.coordinates.iter().zip(point) {
             arrays.put(array, &x.to_be_bytes())?;
         }
         put_int(arrays, plan.node_map, number + 1)
     };
-    mesh.vertices_with(fields, |number, vertex, words| {
-        for (&array, x) in plan.node_values.iter().zip(to_doubles(fields, words)) {
-            arrays.put(array, &x.to_be_bytes())?;
-        }
-        put(arrays, number, vertex.point)
-    })?;
+    mesh.vertices_with(fields, |number, vertex, words| put(arrays, number, vertex.point, words))?;
     if let Some(midpoints) = midpoints {
-        for (number, point) in (mesh.n_vertices()..).zip(midpoints.points()?) {
-            put(arrays, number, point?)?;
+        for (number, row) in (mesh.n_vertices()..).zip(midpoints.rows(fields)?) {
+            let (point, words) = row?;
+            put(arrays, number, point, &words)?;
         }
     }
     Ok(())

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use super::super::edge_means::MidpointReader;
 use super::super::error::Result;
 use super::super::merged::{Merged, OpenedPart};
-use super::super::midpoints::{ElementEdges, MidpointReader, Midpoints};
+use super::super::midpoints::{ElementEdges, Midpoints};
 use super::super::stream::{RecordReader, save};
 use super::entities::Entities;
 use super::out::Out;

@@ -133,21 +133,23 @@ fn write_partitions(
     let (grid, fields) = grid;
     let mut file = grid.open_rows(path, rows(&all[..which.start]), rows(partitions))?;
     // The midpoints of a partition follow its vertices.
-    let mut positions = midpoints.map(Midpoints::points).transpose()?;
+    let mut rows = midpoints.map(|midpoints| midpoints.rows(fields)).transpose()?;
     let mut ends = partitions.iter().map(|p| (p.first_vertex + p.n_vertices, p.n_midpoints));
     let mut end = ends.next();
     mesh.vertices_with(fields, |number, vertex, words| {
         while let Some((_, n)) = end.filter(|(end, _)| number >= *end) {
-            for position in positions.iter_mut().flat_map(|p| p.by_ref().take(n as usize)) {
-                file.point(&(NO_ID, Vec::new()), position?)?;
+            for row in rows.iter_mut().flat_map(|rows| rows.by_ref().take(n as usize)) {
+                let (position, words) = row?;
+                file.point(&(NO_ID, words), position)?;
             }
             end = ends.next();
         }
         file.point(&(vertex.id as i64, words.to_vec()), vertex.point)
     })?;
     for (_, n) in end.into_iter().chain(ends) {
-        for position in positions.iter_mut().flat_map(|p| p.by_ref().take(n as usize)) {
-            file.point(&(NO_ID, Vec::new()), position?)?;
+        for row in rows.iter_mut().flat_map(|rows| rows.by_ref().take(n as usize)) {
+            let (position, words) = row?;
+            file.point(&(NO_ID, words), position)?;
         }
     }
     let mut part = &partitions[0];

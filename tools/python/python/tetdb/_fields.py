@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Callable, Iterator, MutableMapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from ._store import Store
 
 __all__ = ["Fields", "StoreField"]
+
+_TYPES = {"f4": "f4", "f8": "f8", "i1": "i4", "i2": "i4", "i4": "i4", "i8": "i8", "u1": "i4", "u2": "i4", "u4": "i8"}
+"""The type of a field that holds numbers of a type."""
 
 
 class StoreField:
@@ -62,7 +65,7 @@ class StoreField:
 
 
 class Fields(MutableMapping[str, Any]):
-    """The fields of a store by name. `fields["T"] = array` adds one, `del fields["T"]` drops it."""
+    """The fields of a store by name. `fields["T"] = array` or `fields["T"] = callable` adds one, `del fields["T"]` drops it."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -82,7 +85,7 @@ class Fields(MutableMapping[str, Any]):
                 return StoreField(self._store, said)
         raise KeyError(name)
 
-    def __setitem__(self, name: str, values: npt.ArrayLike) -> None:
+    def __setitem__(self, name: str, values: npt.ArrayLike | Callable[[Any], npt.ArrayLike]) -> None:
         self.add(name, values)
 
     def __delitem__(self, name: str) -> None:
@@ -93,7 +96,7 @@ class Fields(MutableMapping[str, Any]):
     def add(
         self,
         name: str,
-        values: npt.ArrayLike | str,
+        values: npt.ArrayLike | str | Callable[[Any], npt.ArrayLike],
         *,
         at: str | None = None,
         ids: npt.ArrayLike | None = None,
@@ -104,11 +107,13 @@ class Fields(MutableMapping[str, Any]):
         ----------
         name : str
             Its name.
-        values : array or str
-            A row for each value, of 1, 3, 6 or 9 numbers, in the order of an export or as `ids` say; or an expression such as
-            ``"300 + 20*x"``.
+        values : array, str or callable
+            A row for each value, of 1, 3, 6 or 9 numbers, in the order of an export or as `ids` say; an expression such as
+            ``"300 + 20*x"``; or a callable that is called once for each chunk and returns such rows. At vertices it takes their points
+            (n, 3), at tetrahedra a :class:`Chunk`. Memory is that of a chunk. The type is that of the first answer. What the callable raises
+            is raised here, and no field is added.
         at : str, optional
-            `vertices` or `tets`; left out, an array with as many rows as there are tetrahedra is at these, any other at vertices.
+            `vertices` or `tets`; left out, an array with as many rows as there are tetrahedra is at these, all else at vertices.
         ids : array of int, optional
             Lasting ids of the vertices or tetrahedra, one for each row.
         """
@@ -116,10 +121,15 @@ class Fields(MutableMapping[str, Any]):
         if isinstance(values, str):
             native.add_field(name, at or "vertices", values, False, None)
             return
+        if at not in (None, "vertices", "tets"):
+            raise TetdbError("bad-field", f"at={at!r}: expected 'vertices' or 'tets'", None, None)
+        if callable(values):
+            if ids is not None:
+                raise TetdbError("bad-field", "ids belong to an array; a callable gives the values of a chunk in its order", "ids")
+            native.fill_field(name, at or "vertices", _at_tets(values) if at == "tets" else _at_vertices(values))
+            return
         array = np.ascontiguousarray(values)
         place = at or ("tets" if len(array) == self._store.n_tets else "vertices")
-        if place not in ("vertices", "tets"):
-            raise TetdbError("bad-field", f"at={place!r}: expected 'vertices' or 'tets'", None, None)
         with tempfile.TemporaryDirectory() as folder:
             file = os.path.join(folder, "values.npy")
             np.save(file, array)
@@ -128,3 +138,35 @@ class Fields(MutableMapping[str, Any]):
                 names = os.path.join(folder, "ids.npy")
                 np.save(names, np.ascontiguousarray(ids, dtype="<i8"))
             native.add_field(name, place, file, True, names)
+
+
+def _at_vertices(values: Callable[[Any], npt.ArrayLike]) -> Callable[..., npt.NDArray[Any]]:
+    """`values` as the native half calls it, with points."""
+
+    def answer(points: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        points.flags.writeable = False
+        return _numbers(values(points), len(points))
+
+    return answer
+
+
+def _at_tets(values: Callable[[Any], npt.ArrayLike]) -> Callable[..., npt.NDArray[Any]]:
+    """`values` as the native half calls it, with a block of tetrahedra."""
+    from ._store import chunk_of
+
+    def answer(rank: int, first: int, block: Any) -> npt.NDArray[Any]:
+        chunk = chunk_of(rank, first, block)
+        return _numbers(values(chunk), len(chunk.tets))
+
+    return answer
+
+
+def _numbers(found: npt.ArrayLike, n: int) -> npt.NDArray[Any]:
+    """What a callable returns for `n` places, number by number, in a type that fields have."""
+    array = np.asarray(found)
+    kind = _TYPES.get(array.dtype.str[1:])
+    if kind is None:
+        raise TetdbError("bad-field", f"the callable returns {array.dtype}: expected float32, float64 or integers of up to 8 bytes")
+    if not array.ndim or len(array) != n:
+        raise TetdbError("bad-field", f"the callable returns an array of shape {array.shape}: expected {n} rows")
+    return np.ascontiguousarray(array, dtype=kind).reshape(-1)

@@ -357,13 +357,7 @@ class Store:
         for row in self.subdomains:
             part = self._native.part(row.rank)
             for first in range(0, row.n_tets, n):
-                points, vertex_ids, tets, regions = part.block(first, n)
-                for array in (points, vertex_ids, tets, regions):
-                    _locked(array)
-                start = (row.rank << _TET_BITS) + first
-                ids = _locked(np.arange(start, start + len(tets), dtype=np.int64))
-                chunk = Chunk(row.rank, points, tets, regions, ids, vertex_ids)
-                del points, vertex_ids, tets, regions, ids, array
+                chunk = chunk_of(row.rank, first, part.block(first, n))
                 yield chunk
                 # What the caller let go of is gone before the next is read.
                 del chunk
@@ -387,7 +381,7 @@ class Store:
         return Merged(points, tets, regions, owners, vertex_ids)
 
     def to_pyvista(self, subdomain: int | Sequence[int] | None = None) -> Any:
-        """A PyVista ``UnstructuredGrid`` of the tetrahedra, with cell data `region` and `subdomain`; needs the package pyvista.
+        """A PyVista ``UnstructuredGrid`` of the tetrahedra, with cell data `region`, `subdomain` and `quality`; needs the package pyvista.
 
         The input's triangles with their labels are in :attr:`Subdomain.facets`, and in what :meth:`export` writes.
         """
@@ -397,6 +391,7 @@ class Store:
         grid = pyvista.UnstructuredGrid(cells, mesh.points)
         grid.cell_data["region"] = mesh.regions
         grid.cell_data["subdomain"] = mesh.subdomains
+        grid.cell_data["quality"] = _native.qualities(mesh.points, mesh.tets)
         return grid
 
     def arrow(
@@ -899,6 +894,16 @@ class Store:
         """
         n_tets, findings = self._native.verify(bool(full))
         return Verification(not findings, n_tets, dict(findings))
+
+
+def chunk_of(rank: int, first: int, block: tuple[Floats, Ids, Ints, Ints]) -> Chunk:
+    """A block whose first tetrahedron has the number `first` in its sub-domain."""
+    points, vertex_ids, tets, regions = block
+    for array in (points, vertex_ids, tets, regions):
+        _locked(array)
+    start = (rank << _TET_BITS) + first
+    ids = _locked(np.arange(start, start + len(tets), dtype=np.int64))
+    return Chunk(rank, points, tets, regions, ids, vertex_ids)
 
 
 def _info_of(row: dict[str, Any]) -> SubdomainInfo:
