@@ -55,7 +55,7 @@ def main():
                     except ModuleNotFoundError as error:
                         refused[kind] = f"{error.name} is not installed"
                         continue
-                    except Exception as error:
+                    except (Exception, SystemExit) as error:
                         if is_mixed and kind in MIXED:
                             refused[f"{kind} of {os.path.splitext(path)[1]}"] = f"{type(error).__name__} in meshio"
                         else:
@@ -65,7 +65,7 @@ def main():
                     written += 1
                     try:
                         back = tets_of(quiet(meshio.read, out, file_format=kind))
-                    except Exception:  # it does not read what it wrote
+                    except (Exception, SystemExit):  # it does not read what it wrote
                         continue
                     if back != n and not is_mixed:
                         print(f"{path}: {back} tetrahedra of {n} are left in {kind}")
