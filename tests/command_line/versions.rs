@@ -205,7 +205,7 @@ fn what_makes_no_sense_is_refused() {
     assert_eq!(place.digest("a.tetdb"), new);
 }
 
-/// What comes back replaces what is there, so it is read before.
+/// An undo deletes the present mesh, so the previous one is read first.
 #[test]
 fn what_is_damaged_does_not_come_back() {
     let (place, _, new) = made();

@@ -106,7 +106,7 @@ impl Store {
         let summary = guarded(&settings, || {
             let mut catalog = open_to_change(&path, &settings)?;
             let (lock, number) = (catalog.lock(), which(&mut catalog)?);
-            // What is there now goes with an undo, so that what comes back must be sound.
+            // An undo deletes the present mesh, so the previous one must be sound.
             if let Some(damage) = audit::damage_of_version(&mut catalog, number)?.into_iter().next()
             {
                 let mut error = Error::from(damage);

@@ -1,7 +1,8 @@
 //! The plane of a cut: across the longest axis of inertia, where it divides the predicted load as wanted.
 //!
 //! The paper takes the axis of inertia of the centroids of the coarse mesh. Here every piece weighs its load, so that
-//! the axis is that of the mesh to come; the two other axes and those of the coordinates are candidates as well, and the one whose
+//! the axis is that of the mesh to come; the two other axes and those of the coordinates are candidates as well, unless the load spreads no farther along an axis than
+//! along a coordinate, and the one whose
 //! plane promises the fewest interface faces wins: for a cube, whose axes of inertia are arbitrary, that is a plane along its sides.
 //!
 //! Source: the paper, section 1.1, "Defining the cutting plane".

@@ -47,7 +47,7 @@ impl Field {
 /// sub-domain, number of the first, and the arrays of a block. It returns the numbers one after the other, in an array of one of the four types.
 pub struct FieldCallable {
     pub callable: Py<PyAny>,
-    /// What it raised.
+    /// The exception of the call that failed.
     pub raised: Option<PyErr>,
 }
 
@@ -80,7 +80,7 @@ impl FieldCallable {
     }
 }
 
-/// What the callable is given.
+/// Arguments of a call.
 enum Given {
     Points(Vec<f64>),
     Tets(u32, usize, Block),
