@@ -1,8 +1,7 @@
 //! The plane of a cut: across the longest axis of inertia, where it divides the predicted load as wanted.
 //!
-//! The paper takes the axis of inertia of the centroids of the coarse mesh. Here every piece weighs its load, so that
-//! the axis is that of the mesh to come; the two other axes and those of the coordinates are candidates as well, unless the load spreads no farther along an axis than
-//! along a coordinate, and the one whose
+//! The paper takes the axis of inertia of the centroids of the coarse mesh. Here every piece weighs its load, so that the axis is that of
+//! the mesh to come. Candidates are the axes of the coordinates, and those of inertia along which the load spreads farther. The one whose
 //! plane promises the fewest interface faces wins: for a cube, whose axes of inertia are arbitrary, that is a plane along its sides.
 //!
 //! Source: the paper, section 1.1, "Defining the cutting plane".
