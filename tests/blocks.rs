@@ -6,11 +6,17 @@
 //! bricks leave it. All must have one digest, and be verified against the surface. Bounds on qualities are a little wider than what
 //! was measured.
 
-use tetdb_base::storage::{Budget, CancelToken, RunContext, ScratchSpace};
+use std::collections::BTreeMap;
+
+use tetdb_base::geom::{Point, orient};
+use tetdb_base::storage::{Budget, CancelToken, DiskPath, FlatPages, RunContext, ScratchSpace};
 use tetdb_base::surface::Surface;
 use tetdb_engine::pipeline::{
     self, MeshOptions, Options, OptionsText, Plan, RunOptions, Subdomains, Summary, Trial, silent,
 };
+use tetdb_kernel::blocks::{Field, PlacementRule, saturate};
+use tetdb_kernel::mesh::{FaceRef, Mesh, Tet};
+use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::Job;
 use tetdb_store::audit::{self, Level, Report, VerifyOptions};
@@ -87,4 +93,112 @@ fn neither_threads_nor_memory_show() {
         let bad = one.bad as f64 / one.report.tets as f64;
         assert!(bad <= bad_max && one.worst <= worst_max, "{words}: {bad} bad, {}", one.worst);
     }
+}
+
+/// Points go to a ball alone.
+struct InBall {
+    center: Point,
+    radius: f64,
+}
+
+impl InBall {
+    fn distance(&self, p: Point) -> f64 {
+        (p - self.center).length() - self.radius
+    }
+}
+
+impl PlacementRule for InBall {
+    fn is_partial(&self) -> bool {
+        true
+    }
+
+    fn reaches(&self, points: &[Point; 4], sizes: &[f32; 4]) -> bool {
+        let low = points.iter().copied().reduce(Point::min).expect("four corners");
+        let high = points.iter().copied().reduce(Point::max).expect("four corners");
+        let nearest = self.center.clamp(low, high);
+        self.distance(nearest) < f64::from(sizes[0])
+    }
+
+    fn admits(&self, p: Point, _: f64) -> bool {
+        self.distance(p) < 0.0
+    }
+
+    fn forbids(&self, _: Point, _: f64) -> bool {
+        false
+    }
+}
+
+/// Records of all tetrahedra, after checks of signs and neighbors; with the volume.
+fn sound(mesh: &mut Mesh<FlatPages>) -> (BTreeMap<u32, Tet>, f64) {
+    let (mut tets, mut volume, mut from) = (BTreeMap::new(), 0.0, 0);
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        let [a, b, c, d] = mesh.points(&tet);
+        let six = orient(a, b, c, d);
+        assert!(six > 0.0, "tetrahedron {t}");
+        volume += six / 6.0;
+        for (i, across) in tet.neighbor.into_iter().enumerate() {
+            assert!(across.exists() || tet.is_required(i), "face {i} of {t} is open");
+            if across.exists() {
+                let other = mesh.tet(across.tet());
+                assert!(other.is_live() && other.neighbor[across.face()] == FaceRef::new(t, i));
+                let faces = [tet.face(i), other.face(across.face())].map(|mut face| {
+                    face.sort_unstable();
+                    face
+                });
+                assert_eq!(faces[0], faces[1]);
+            }
+        }
+        tets.insert(t, tet);
+    }
+    assert_eq!(tets.len(), mesh.n_tets() as usize);
+    (tets, volume)
+}
+
+/// Where points go to a part of space alone, the tetrahedra far from it keep their ids and records, and the part is divided as wanted.
+#[test]
+fn what_lies_far_from_a_part_stays_as_it_is() {
+    let h = 0.03;
+    let surface: Surface =
+        SampleSpec::parse("box,x=5,h=0.1").and_then(|spec| spec.make()).expect("a box").into();
+    let mut mesh = Mesh::new(FlatPages::default());
+    let room = ScratchSpace::boundless();
+    pipeline::coarse_mesh(&mut mesh, &surface, &Options::default(), &room, &silent)
+        .expect("a box meshes");
+    for v in mesh.vertex_ids() {
+        mesh.set_size(v, h as f32);
+    }
+    let (before, volume) = sound(&mut mesh);
+    let bounds = surface.bounds();
+    // Wall to wall at one end, and a ball that touches no wall.
+    for (center, radius) in [(Point::new(0.2, 0.5, 0.5), 0.3), (Point::new(1.0, 0.5, 0.5), 0.2)] {
+        let ball = InBall { center, radius };
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let dir = DiskPath::from(dir.path());
+        let field = Field { h: &|_| h, place: &ball, bounds };
+        let inserted = saturate(&mut mesh, &field, Mode::None, &dir, &mut |_| ()).refine.inserted;
+        assert!(inserted > 300, "{inserted} points");
+        let (after, now) = sound(&mut mesh);
+        assert!((now - volume).abs() < 1e-9 * volume);
+        let mut inside = 0;
+        for tet in after.values() {
+            let points = mesh.points(tet);
+            if points.iter().all(|&p| ball.distance(p) < -2.0 * h) {
+                inside += 1;
+                let longest = (0..4).flat_map(|i| (0..i).map(move |j| (i, j)));
+                let longest = longest.map(|(i, j)| (points[i] - points[j]).length());
+                assert!(longest.fold(0.0, f64::max) < 4.0 * h, "{points:?}");
+            }
+        }
+        assert!(inside > 1_000, "{inside} tetrahedra in the ball");
+    }
+    let (after, _) = sound(&mut mesh);
+    let far: Vec<u32> = before
+        .iter()
+        .filter(|(_, tet)| mesh.points(tet).iter().all(|p| p.x > 4.5))
+        .map(|(&t, _)| t)
+        .collect();
+    assert!(far.len() > 100, "{} tetrahedra at the far end", far.len());
+    let changed = far.iter().filter(|&t| before[t] != after[t]).count();
+    assert_eq!(changed, 0, "of {}", far.len());
 }

@@ -94,6 +94,14 @@ impl PlacementRule for InZone<'_> {
         near || (low && high)
     }
 
+    fn needs(&self, points: &[Point; 4], sizes: &[f32; 4]) -> bool {
+        let distance = |p: Point| self.zone.surface.distance(p);
+        let is_final = |(&p, &h): (&Point, &f32)| self.zone.is_final(p, f64::from(h));
+        points.iter().zip(sizes).any(is_final)
+            || points.iter().any(|&p| distance(p) < 0.0)
+                && points.iter().any(|&p| distance(p) > 0.0)
+    }
+
     fn coarse_length(&self, p: Point, h: f64) -> f64 {
         let beyond = self.zone.surface.distance(p).abs() - (WIDTH_MIN + WIDTH_NOISE) * h;
         h.max(COARSE_SLOPE * beyond)

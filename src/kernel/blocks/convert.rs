@@ -7,6 +7,7 @@ use tetdb_schema::page::NONE;
 use super::brick::{Brick, Bricks, SLOT_BITS, SLOT_MASK, Slot};
 use super::field::Field;
 use super::flat::Vertex;
+use super::part::Part;
 use super::partition::KdPartition;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
@@ -34,19 +35,24 @@ fn next_slot(counts: &mut [u32], brick: u32) -> Slot {
     Slot { brick, slot }
 }
 
-/// Fills empty bricks with a mesh. Coarse vertices keep their id in their note. What lies beyond the field's place counts as examined.
-/// Effects: the scratch map is used up.
+/// Flag in bricks of a tetrahedron at the rim of a part. Its region is its dense id in the mesh.
+pub(super) const RIM: u32 = 1 << 31;
+
+/// Fills empty bricks with a mesh, or with a part of it. Coarse vertices keep their id in their note. What lies beyond the field's place
+/// counts as examined. Effects: the scratch map is used up.
 pub(super) fn to_bricks<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &Field,
     partition: &KdPartition,
+    part: Option<&Part>,
     bricks: &Bricks,
 ) {
     let n_vertices = dense(mesh.vertex_ids_end());
     let n_tets = dense(mesh.tet_ids_end());
     mesh.reset_scratch(n_vertices + n_tets, NONE);
+    let all = || Members::new(part, n_tets);
     // Ids given back have no tetrahedron.
-    for k in 0..n_tets {
+    for (k, _) in all() {
         let tet = mesh.tet(sparse(k));
         if tet.is_live() {
             tet.vertices().into_iter().for_each(|v| mesh.set_scratch(dense(v), 0));
@@ -64,7 +70,7 @@ pub(super) fn to_bricks<P: Pages>(
         bricks.change(to.brick, |brick| brick.vertices.push(vertex));
     }
     counts.fill(0);
-    for k in 0..n_tets {
+    for (k, _) in all() {
         let tet = mesh.tet(sparse(k));
         if tet.is_live() {
             let [a, b, c, d] = tet.vertices().map(|v| unpacked(mesh.scratch(dense(v))).brick);
@@ -73,10 +79,16 @@ pub(super) fn to_bricks<P: Pages>(
         }
     }
     let mut unmatched = 0;
-    for k in 0..n_tets {
+    for (k, at_rim) in all() {
         let mut tet = mesh.tet(sparse(k));
         if !tet.is_live() {
             continue;
+        }
+        if at_rim && let Some(part) = part {
+            let leads_in = |face: FaceRef| part.inside.binary_search(&dense(face.tet())).is_ok();
+            for face in tet.neighbor.iter_mut().filter(|face| face.exists() && !leads_in(**face)) {
+                *face = FaceRef::NONE;
+            }
         }
         for face in (0..4).map(|i| FaceRef::new(sparse(k), i)) {
             unmatched ^= pair_code(&tet, face);
@@ -86,8 +98,8 @@ pub(super) fn to_bricks<P: Pages>(
             face.exists().then(|| unpacked(mesh.scratch(n_vertices + dense(face.tet()))))
         });
         let home = unpacked(mesh.scratch(n_vertices + k));
-        let attribute = mesh.tet_attribute(sparse(k));
-        let is_due = !field.place.is_partial() || field.reaches(&mesh.ends(&tet));
+        let attribute = if at_rim { (k, RIM) } else { mesh.tet_attribute(sparse(k)) };
+        let is_due = !at_rim && (part.is_none() || field.reaches(&mesh.ends(&tet)));
         bricks.change(home.brick, |brick| {
             for (node, to) in tet.node.iter_mut().zip(vertices) {
                 *node = *node & !(VERTEX_MASK | MARK) | brick.refer(to);
@@ -109,6 +121,36 @@ pub(super) fn to_bricks<P: Pages>(
     mesh.clear_scratch();
     // Pages that were changed together with their checksums: the caller then looks for the place.
     assert_eq!(unmatched, 0, "neighbors of different faces");
+}
+
+/// Dense ids of the tetrahedra that become bricks, ascending, and whether each is at the rim.
+enum Members<'a> {
+    All(std::ops::Range<u32>),
+    Part(std::slice::Iter<'a, u32>, std::slice::Iter<'a, u32>),
+}
+
+impl<'a> Members<'a> {
+    fn new(part: Option<&'a Part>, n_tets: u32) -> Self {
+        match part {
+            None => Self::All(0..n_tets),
+            Some(Part { inside, rim }) => Self::Part(inside.iter(), rim.iter()),
+        }
+    }
+}
+
+impl Iterator for Members<'_> {
+    type Item = (u32, bool);
+
+    fn next(&mut self) -> Option<(u32, bool)> {
+        match self {
+            Self::All(ids) => ids.next().map(|k| (k, false)),
+            Self::Part(inside, rim) => match (inside.as_slice().first(), rim.as_slice().first()) {
+                (Some(a), Some(b)) if b < a => rim.next().map(|&k| (k, true)),
+                (Some(_), _) => inside.next().map(|&k| (k, false)),
+                (None, _) => rim.next().map(|&k| (k, true)),
+            },
+        }
+    }
 }
 
 /// A number that a face has on both of its sides if their vertices and references fit, and hardly ever otherwise; 0 on the boundary.
@@ -134,10 +176,32 @@ struct Numbers {
     tet: u32,
 }
 
+/// Ids for the tetrahedra of all bricks: those that the part had, then such behind all others.
+struct TetIds {
+    reused: Vec<u32>,
+    behind: u32,
+}
+
+impl TetIds {
+    #[inline(always)]
+    fn id(&self, k: u32) -> u32 {
+        sparse(match self.reused.get(k as usize) {
+            Some(&id) => id,
+            None => self.behind + k - self.reused.len() as u32,
+        })
+    }
+}
+
 /// Writes the bricks back and empties them: coarse vertices under their ids, others behind; tetrahedra in the order of the bricks.
 ///
-/// The mesh must have no tetrahedra. Returns how many have several required faces. Effects: the scratch map is used up.
-pub(super) fn to_pages<P: Pages>(bricks: &Bricks, n_bricks: u32, mesh: &mut Mesh<P>) -> u64 {
+/// The mesh must have no tetrahedra but those beyond the part. Returns how many have several required faces. Effects: the scratch map is
+/// used up.
+pub(super) fn to_pages<P: Pages>(
+    bricks: &Bricks,
+    n_bricks: u32,
+    mesh: &mut Mesh<P>,
+    part: Option<Part>,
+) -> u64 {
     let mut over_constrained = 0;
     let mut numbers: Vec<Numbers> = Vec::with_capacity(n_bricks as usize);
     let (mut n_coarse, mut n_tets) = (0, 0);
@@ -164,29 +228,40 @@ pub(super) fn to_pages<P: Pages>(bricks: &Bricks, n_bricks: u32, mesh: &mut Mesh
             }
         }
     }
-    mesh.take_tets(n_tets);
-    let mut unused = Vec::new();
+    let reused = part.map_or_else(Vec::new, |part| part.inside);
+    let behind = mesh.take_tets(n_tets.saturating_sub(reused.len() as u32));
+    let ids = TetIds { reused, behind };
+    let mut unused: Vec<u32> =
+        ids.reused.iter().skip(n_tets as usize).map(|&id| sparse(id)).collect();
+    let mut at_rim = Vec::new();
     let (mut k, mut first) = (0, 0);
     while first < n_bricks {
         let batch: Vec<_> =
             (first..n_bricks).take(BATCH).map(|number| bricks.take(number)).collect();
         first += batch.len() as u32;
         let parts: Vec<u32> = (0..batch.len() as u32).collect();
-        let tets = scan_parts(mesh, &parts, &Renumbered { batch: &batch, numbers: &numbers });
+        let scan = Renumbered { batch: &batch, numbers: &numbers, ids: &ids };
+        let tets = scan_parts(mesh, &parts, &scan);
         for (brick, (tets, n)) in batch.iter().zip(tets) {
             over_constrained += n;
             for (tet, &attribute) in tets.into_iter().zip(&brick.attributes) {
-                let t = sparse(k);
+                let t = ids.id(k);
                 k += 1;
                 mesh.place_tet(t, tet);
-                if !tet.is_live() {
+                if attribute.1 & RIM != 0 {
+                    let kept =
+                        (0..4).map(|i| (FaceRef::new(sparse(attribute.0), i), tet.neighbor[i]));
+                    at_rim.extend(kept.filter(|(_, inside)| inside.exists()));
                     unused.push(t);
-                } else if attribute != (0, 0) {
+                } else if !tet.is_live() {
+                    unused.push(t);
+                } else if attribute != (0, 0) || !ids.reused.is_empty() {
                     mesh.set_tet_attribute(t, attribute.0, attribute.1);
                 }
             }
         }
     }
+    at_rim.into_iter().for_each(|(kept, inside)| mesh.link(kept, inside));
     unused.into_iter().rev().for_each(|t| mesh.free_tet(t));
     gone.into_iter().rev().for_each(|v| mesh.free_vertex(v));
     mesh.clear_scratch();
@@ -200,6 +275,7 @@ const BATCH: usize = 128;
 struct Renumbered<'a> {
     batch: &'a [Arc<Brick>],
     numbers: &'a [Numbers],
+    ids: &'a TetIds,
 }
 
 impl Scan for Renumbered<'_> {
@@ -223,7 +299,7 @@ impl Scan for Renumbered<'_> {
             }
             for face in &mut out.neighbor {
                 if let Some(at) = brick.across(*face) {
-                    let t = sparse(self.numbers[at.brick as usize].tet + at.slot);
+                    let t = self.ids.id(self.numbers[at.brick as usize].tet + at.slot);
                     *face = FaceRef::new(t, face.face());
                 }
             }

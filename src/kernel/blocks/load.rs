@@ -6,9 +6,10 @@
 use rayon::prelude::*;
 
 use super::field::Field;
+use super::part::Part;
 use super::scaffold::{COARSER, is_void};
 use crate::mesh::anatomy::EDGES;
-use crate::mesh::{Mesh, Scan, Tet, scan_parts, tets_of_page};
+use crate::mesh::{Mesh, Scan, Tet, scan_parts, sparse, tets_of_page};
 use crate::sizing::{TETS_PER_LOAD, density_of_tet};
 use tetdb_base::geom::{Point, mix, orient};
 use tetdb_base::storage::{Pages, StorageError, kind, parallel, raise, spare_threads};
@@ -101,20 +102,37 @@ fn sized<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) -> SizedTet {
     (ends.map(|e| e.point), ends.map(|e| f64::from(e.h)))
 }
 
-/// Samples the load to come of a coarse mesh. Their number is bounded.
-pub(super) fn sample<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<Sample> {
+/// Samples the load to come of a coarse mesh, or of a part of it. Their number is bounded.
+pub(super) fn sample<P: Pages>(
+    mesh: &mut Mesh<P>,
+    field: &Field,
+    part: Option<&Part>,
+) -> Vec<Sample> {
     let mut samples = Samples::default();
     // Each part may have as many samples as the whole.
     let room = mesh.pages().bytes_used().map_or(u64::MAX, |[used, most]| most.saturating_sub(used));
     let parts = spare_threads().min(PARTS).min((room / 4 / SAMPLES_BYTES) as usize).max(1);
     let mut tets = Vec::with_capacity(PART * parts);
-    let mut from = 0;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        tets.push(sized(mesh, &tet));
+    let mut add = |mesh: &mut Mesh<P>, tet: &Tet| {
+        tets.push(sized(mesh, tet));
         if tets.len() == PART * parts {
             samples.add_parts(&tets, field);
             tets.clear();
+        }
+    };
+    match part {
+        Some(part) => {
+            for &k in &part.inside {
+                let tet = mesh.tet(sparse(k));
+                add(mesh, &tet);
+            }
+        }
+        None => {
+            let mut from = 0;
+            while let Some((t, tet)) = mesh.next_tet(from) {
+                from = t + 1;
+                add(mesh, &tet);
+            }
         }
     }
     samples.add_parts(&tets, field);

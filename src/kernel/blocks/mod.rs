@@ -2,8 +2,9 @@
 //!
 //! 1. `scaffold`: no tetrahedron is left that would outreach a margin. A large void is first saturated at coarser lengths, by all these
 //!    steps.
-//! 2. `partition`: a k-d tree over the predicted load. Leaves are bricks, which hold the mesh; subtrees are blocks.
-//! 3. `tasks`: each block is visited twice, to be divided and to be smoothed. A visit checks the block and a margin out into plain
+//! 2. `part`: where points go to a part of space alone, the rest of the mesh stays where it is.
+//! 3. `partition`: a k-d tree over the predicted load. Leaves are bricks, which hold the mesh; subtrees are blocks.
+//! 4. `tasks`: each block is visited twice, to be divided and to be smoothed. A visit checks the block and a margin out into plain
 //!    arrays (`region`), works there (`divide`, `smooth`), and checks it in again.
 //!
 //! Each visit depends on the partition and on earlier visits alone, and their order is fixed. So the mesh depends neither on threads nor
@@ -18,6 +19,7 @@ mod improve;
 mod insert;
 mod lawson;
 mod load;
+mod part;
 mod partition;
 mod placement;
 mod recent;
@@ -32,11 +34,14 @@ mod tasks;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use crate::mesh::Mesh;
+use crate::mesh::anatomy::MARK;
+use crate::mesh::anatomy::mark::EXAMINED;
+use crate::mesh::{Mesh, Tet};
 use crate::optimize::{Mode, OperationCounts};
 use brick::Bricks;
 use divide::Divider;
 pub use field::Field;
+use part::Part;
 use partition::{KdPartition, TOO_STEEP};
 pub use placement::{Everywhere, PlacementRule};
 use region::Region;
@@ -62,6 +67,8 @@ pub struct BlockReport {
 const COARSE_TETS: f64 = 20_000.0;
 /// Rings of bricks, each those that the bricks before refer to, around what was put off by all blocks.
 const RINGS: [u32; 4] = [1, 2, 4, 8];
+/// Rings of tetrahedra around what a partial field reaches; more if something in the middle could not be divided for want of them.
+const PART_RINGS: [u32; 3] = [3, 8, 24];
 /// No further ring is begun with so many bricks: the region would be several times that of a visit.
 const RING_BRICKS_MAX: usize = 1_024;
 
@@ -77,32 +84,62 @@ pub fn saturate<P: Pages>(
     dir: &DiskPath,
     progress: &mut dyn FnMut(u64),
 ) -> BlockReport {
-    saturate_at(mesh, field, (mode, true), dir, progress)
+    if !field.place.is_partial() {
+        let load = load::predict(mesh, field);
+        load::check(load.tets);
+        let is_void = load.in_voids > COARSE_TETS.max(f64::from(mesh.n_tets()));
+        let coarser = if is_void { saturate_coarser(mesh, field, dir) } else { 0 };
+        let how = How { mode, is_final: true, rings: None };
+        let mut report = saturate_at(mesh, field, how, dir, &mut |n| progress(coarser + n));
+        report.refine.inserted += coarser;
+        return report;
+    }
+    let mut report = BlockReport::default();
+    for rings in PART_RINGS {
+        let before = report.refine.inserted;
+        let how = How { mode, is_final: true, rings: Some(rings) };
+        let made = saturate_at(mesh, field, how, dir, &mut |n| progress(before + n));
+        report.operations.add(&made.operations);
+        report.refine.add(&made.refine);
+        report.refine.unexamined = made.refine.unexamined;
+        if report.refine.unexamined == 0 {
+            break;
+        }
+    }
+    report
 }
 
-/// Likewise; if it `is_final`, nothing is left that could be divided.
+/// What to saturate, and how.
+#[derive(Clone, Copy)]
+struct How {
+    mode: Mode,
+    /// Whether nothing is to be left that could be divided.
+    is_final: bool,
+    /// Rings of tetrahedra around a part; `None` for the whole mesh.
+    rings: Option<u32>,
+}
+
+/// Scaffold, partition, visits.
 fn saturate_at<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &Field,
-    (mode, is_final): (Mode, bool),
+    How { mode, is_final, rings }: How,
     dir: &DiskPath,
     progress: &mut dyn FnMut(u64),
 ) -> BlockReport {
-    let load = load::predict(mesh, field);
-    load::check(load.tets);
-    let mut scaffold = 0;
-    if !field.place.is_partial() && load.in_voids > COARSE_TETS.max(f64::from(mesh.n_tets())) {
-        scaffold += saturate_coarser(mesh, field, dir);
-    }
-    scaffold += scaffold::build(mesh, field);
-    let partition = KdPartition::new(load::sample(mesh, field), field.bounds, field.h);
+    let scaffold = scaffold::build(mesh, field);
+    let part = rings.map(|rings| Part::around(mesh, field, rings));
+    let samples = load::sample(mesh, field, part.as_ref());
+    let partition = KdPartition::new(samples, field.bounds, field.h);
     load::check(partition.load());
     let n_bricks = partition.n_bricks();
     let memory = Memory::of(mesh, &partition);
     let bricks = Bricks::new(n_bricks, memory.bricks / 2, Some(dir.clone()));
     mesh.pages_mut().use_at_most(memory.pages_at_first);
-    convert::to_bricks(mesh, field, &partition, &bricks);
-    mesh.clear_tets();
+    convert::to_bricks(mesh, field, &partition, part.as_ref(), &bricks);
+    if part.is_none() {
+        mesh.clear_tets();
+    }
     bricks.limit(memory.bricks);
     mesh.pages_mut().use_at_most(memory.pages);
     let mut graph = Graph::new(&partition, if mode == Mode::None { 1 } else { 2 });
@@ -140,11 +177,11 @@ fn saturate_at<P: Pages>(
     }
     visits.bricks.limit(memory.bricks / 2);
     mesh.pages_mut().use_at_most(memory.pages_at_first);
-    let over_constrained = convert::to_pages(&visits.bricks, n_bricks as u32, mesh);
+    let over_constrained = convert::to_pages(&visits.bricks, n_bricks as u32, mesh, part);
     mesh.pages_mut().use_at_most(u64::MAX);
     let mut report = visits.report.into_inner().unwrap_or_else(PoisonError::into_inner);
     report.refine.unexamined = unexamined;
-    if !field.place.is_partial() {
+    if rings.is_none() {
         report.refine.over_constrained = over_constrained;
     }
     report
@@ -159,7 +196,8 @@ fn saturate_coarser<P: Pages>(mesh: &mut Mesh<P>, field: &Field, dir: &DiskPath)
     }
     let h = |p| COARSER * (field.h)(p);
     let coarser = Field { h: &h, place: field.place, bounds: field.bounds };
-    let made = saturate_at(mesh, &coarser, (Mode::None, false), dir, &mut |_| ());
+    let how = How { mode: Mode::None, is_final: false, rings: None };
+    let made = saturate_at(mesh, &coarser, how, dir, &mut |_| ());
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, (field.h)(p) as f32);
@@ -257,7 +295,7 @@ impl Visits<'_, '_> {
         for rings in RINGS {
             for block in &self.partition.blocks {
                 let left: Vec<u32> =
-                    block.bricks.clone().filter(|&b| self.unexamined_in(b) > 0).collect();
+                    block.bricks.clone().filter(|&b| self.n_needed(b) > 0).collect();
                 if left.is_empty() {
                     continue;
                 }
@@ -273,7 +311,25 @@ impl Visits<'_, '_> {
                 });
             }
         }
-        self.partition.blocks.iter().map(|block| self.n_unexamined(block)).sum()
+        (0..self.partition.n_bricks() as u32).map(|b| self.n_needed(b)).sum()
+    }
+
+    /// Tetrahedra of a brick that are not examined, and that the field's place needs to be.
+    fn n_needed(&self, number: u32) -> u64 {
+        let n = u64::from(self.unexamined_in(number));
+        if n == 0 || !self.field.place.is_partial() {
+            return n;
+        }
+        let brick = self.bricks.get(number);
+        let is_needed = |tet: &&Tet| {
+            let corners = tet.vertices().map(|v| {
+                let at = brick.resolve(v);
+                self.bricks.get(at.brick).vertices[at.slot as usize]
+            });
+            self.field.place.needs(&corners.map(|v| v.point), &corners.map(|v| v.h()))
+        };
+        let waits = |tet: &&Tet| tet.is_live() && tet.node[EXAMINED] & MARK == 0;
+        brick.tets.iter().filter(waits).filter(is_needed).count() as u64
     }
 
     /// These bricks and those around them, ascending.

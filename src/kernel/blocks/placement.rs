@@ -14,6 +14,11 @@ pub trait PlacementRule: Sync {
         true
     }
 
+    /// Whether it is worth to look farther and farther for what a tetrahedron takes that no block could divide.
+    fn needs(&self, _points: &[Point; 4], _sizes: &[f32; 4]) -> bool {
+        true
+    }
+
     /// The length for which coarse points around the part are spread, where the wanted length is `h`: it grows away from the part.
     fn coarse_length(&self, _p: Point, h: f64) -> f64 {
         h

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use tetdb_schema::page::NONE;
 
 use super::brick::{Brick, SLOT_BITS, SLOT_MASK, Slot};
+use super::convert::RIM;
 use super::flat::{EMPTY, FlatMesh, Vertex};
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
@@ -115,7 +116,7 @@ impl Region {
         }
         self.first_vertex.push(mesh.vertices.len() as u32);
         self.first_tet.push(mesh.tets.len() as u32);
-        mesh.held.resize(mesh.tets.len(), false);
+        mesh.held.extend(mesh.attributes.iter().map(|&(_, flags)| flags & RIM != 0));
     }
 
     /// Turns the references of a tetrahedron into places in the arrays.

@@ -8,6 +8,8 @@ use crate::delaunay::Kernel;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGES, FACES, FROZEN, MARK};
 use crate::mesh::{Mesh, Scan, Tet, scan_parts, tets_of_page};
+use tetdb_schema::page::SLOT_BITS;
+
 use tetdb_base::geom::{HilbertFrame, Point, mix, orient};
 use tetdb_base::storage::{Pages, check_cancelled, kind};
 
@@ -32,9 +34,11 @@ pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
     let mut kernel = Kernel::default();
     let mut last = None;
     let mut inserted = 0;
+    let mut pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
     for round in 0..ROUNDS_MAX {
         check_cancelled();
-        let found = wanted(mesh, field);
+        let found = wanted(mesh, field, &pages);
+        pages.clear();
         let key = |(t, point, h)| {
             let mut key = order.index(point);
             if round == 0 {
@@ -78,11 +82,18 @@ pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
             for &t in kernel.new_tets().iter().skip(recycled) {
                 mesh.set_tet_attribute(t, region, 0);
             }
+            for &t in kernel.new_tets() {
+                if pages.last() != Some(&(t >> SLOT_BITS)) {
+                    pages.push(t >> SLOT_BITS);
+                }
+            }
             inserted += 1;
         }
         if inserted == before {
             break;
         }
+        pages.sort_unstable();
+        pages.dedup();
     }
     inserted
 }
@@ -90,9 +101,9 @@ pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
 /// A tetrahedron, its point, and the length wanted there.
 type Wanted = (u32, Point, f64);
 
-/// The points of long tetrahedra that were not examined before. Effects: they are marked as examined.
-fn wanted<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> Vec<Wanted> {
-    let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
+/// The points of long tetrahedra of some pages that were not examined before, and that the field's place reaches. Effects: they are marked as
+/// examined.
+fn wanted<P: Pages>(mesh: &mut Mesh<P>, field: &Field, pages: &[u32]) -> Vec<Wanted> {
     let mut found = Vec::new();
     for batch in pages.chunks(BATCH) {
         for (due, points) in scan_parts(mesh, batch, &Long(field)) {
@@ -113,7 +124,7 @@ impl Scan for Long<'_, '_> {
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Self::Output {
         let (mut due, mut points) = (Vec::new(), Vec::new());
         tets_of_page(mesh, page, |mesh, t, tet| {
-            if tet.node[EXAMINED] & MARK == 0 {
+            if tet.node[EXAMINED] & MARK == 0 && self.0.reaches(&mesh.ends(&tet)) {
                 due.push(t);
                 points.extend(point_of(mesh, &tet, self.0).map(|(point, h)| (t, point, h)));
             }

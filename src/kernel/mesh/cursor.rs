@@ -228,10 +228,16 @@ impl<P: Pages> Mesh<P> {
         self.state.tets = IdCounts::without_gaps(0);
     }
 
-    /// Takes the ids of `n` tetrahedra of a mesh that has none; each is then to be placed once, in any order.
-    pub fn take_tets(&mut self, n: u32) {
-        debug_assert_eq!(self.state.tets.fresh, 0);
-        self.state.tets = IdCounts::without_gaps(n);
+    /// Takes `n` ids of tetrahedra behind all others, and returns the dense id of the first; each is then to be placed once, in any order.
+    pub fn take_tets(&mut self, n: u32) -> u32 {
+        let tets = &mut self.state.tets;
+        let first = dense(tets.fresh);
+        if u64::from(first) + u64::from(n) > u64::from(dense(VERTEX_MASK - SLOTS as u32)) {
+            raise(StorageError::TooMany { what: "tetrahedra" });
+        }
+        tets.fresh = sparse(first + n);
+        tets.n_live += n;
+        first
     }
 
     /// Writes a tetrahedron whose id was taken by [`Mesh::take_tets`], or is to lie behind all.
