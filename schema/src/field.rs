@@ -104,6 +104,11 @@ impl FieldNumber {
         })
     }
 
+    /// The word of a place that has no value: not a number, or 0 for integers.
+    pub fn nothing(self) -> u64 {
+        self.pack(Scalar::Float(f64::NAN)).unwrap_or_default()
+    }
+
     /// The inverse of [`FieldNumber::pack`].
     pub fn unpack(self, word: u64) -> Scalar {
         match self {

@@ -100,7 +100,10 @@ pub fn in_flags(warning: &SizeWarning) -> String {
 fn help_of(code: Code) -> &'static str {
     match code {
         Code::Busy => "wait for the other process, or stop it",
-        Code::DiskFull => "free some space, then `tetdb resume STORE`",
+        Code::DiskFull if super::signals::has_store() => {
+            "free some space, then `tetdb resume STORE`"
+        }
+        Code::DiskFull => "free some space, then run it again",
         Code::Damaged => {
             "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` meshes damaged sub-domains again, `--forget` drops a damaged previous version, `tetdb version STORE drop NAME` one with a name"
         }

@@ -106,6 +106,19 @@ pub fn repaired(
     Ok(surface)
 }
 
+/// Says of triangles in an error that they are counted in the repaired or remeshed surface.
+pub fn in_prepared(mut failure: Failure, (repair, args): (&RepairArgs, &RemeshArgs)) -> Failure {
+    let what = match (args.remesh_surface, repair.repair) {
+        (true, _) => "remeshed",
+        (false, Some(_)) => "repaired",
+        (false, None) => return failure,
+    };
+    if let Some(place) = failure.place.as_mut().filter(|place| place.starts_with("triangle")) {
+        place.push_str(&format!("; triangles are counted in the {what} surface"));
+    }
+    failure
+}
+
 /// Repairs and remeshes a surface before it is meshed with `options`, where that is asked for.
 pub fn prepared(
     surface: Surface,

@@ -51,7 +51,8 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         .preflight(!args.no_preflight)
         .coarse_only(args.coarse_only)
         .verify(!args.run.no_verify)
-        .create_reported(&path)?;
+        .create_reported(&path)
+        .map_err(|e| input::in_prepared(e.into(), (&args.repair, &args.remesh)))?;
     console.done();
     if created.was_there {
         console.note(&format!(

@@ -89,6 +89,8 @@ fn a_store_being_written_is_busy() {
     let done = place.run_line("info a.tetdb --json");
     if still_running(&mut child) {
         assert_eq!((done.error()["code"].as_str(), done.exit()), (Some("busy"), Some(5)));
+        let message = done.error()["message"].to_string();
+        assert!(message.contains(&format!("process {} on ", child.id())), "{message}");
     }
     child.kill().expect("the child can be killed");
     child.wait().expect("the child can be waited for");

@@ -366,3 +366,36 @@ fn the_table_agrees_with_the_cases() {
         assert_eq!(code.map(|code| i32::from(code.exit())), Some(case.exit), "{}", case.word);
     }
 }
+
+/// What a command refuses names a way out.
+#[test]
+fn a_refusal_says_what_to_do() {
+    let place = Place::new();
+    place.run_line("mesh sample:box,h=0.3 -o b.tetdb --no-verify").succeeds();
+    let refused = |line: &str, exit: i32, words: &str| {
+        let done = place.run_line(line);
+        assert_eq!(done.exit(), Some(exit), "{line}: {}", done.stderr());
+        assert!(done.stderr().contains(words), "{line}: {}", done.stderr());
+    };
+    refused("mesh sample:box,h=0.3 -o c.tetdb --subdomains 0", 2, "give 1 or more");
+    refused("mesh sample:box,h=0.3 -o c.tetdb --threads 4000", 2, "--threads 4000");
+    refused("verify b.tetdb --threads 4000", 2, "--threads 4000");
+    refused("field b.tetdb drop nix", 3, "add a field to the store first");
+    refused("field b.tetdb add a --at vertices --from 1,2", 3, "3 are a vector");
+    refused("adapt b.tetdb --field nix", 2, "--factor");
+    refused("periodic b.tetdb x-low=x-high --drop", 3, "there is nothing to drop");
+    refused("work b.tetdb --task 1", 8, "is finished: no task is left");
+    for name in ["..", ".", ".hidden", "a/b"] {
+        refused(&format!("version b.tetdb save {name}"), 3, "no . at the beginning");
+    }
+    place.run_line("field b.tetdb add u --at tets --from x").succeeds();
+    place.run_line("periodic b.tetdb y-low=y-high").succeeds();
+    refused("field b.tetdb drop nix", 3, "take the name of one that is there");
+    refused("periodic b.tetdb x-low=x-high --drop", 3, "there are y-low=y-high");
+    // Crossings are resolved, and the holes remain.
+    let holes = "mesh sample:broken,kind=holes -o c.tetdb --repair resolve";
+    refused(holes, 3, "triangles are counted in the repaired surface");
+    std::fs::create_dir(place.path("d.tetdb")).expect("a folder");
+    place.write("d.tetdb/catalog.redb-new", "");
+    refused("resume d.tetdb", 8, "there is nothing to go on with");
+}

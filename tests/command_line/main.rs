@@ -2,6 +2,7 @@
 
 mod adapt;
 mod bad_meshes;
+mod boundary_beside;
 mod cells;
 mod check;
 mod closed;

@@ -423,15 +423,10 @@ fn guarded<T, E: Into<redb::Error>>(call: impl FnOnce() -> Result<T, E>) -> Resu
     }
 }
 
-/// Runs a call into redb; on a damaged tree redb may panic, which is damage and not our bug.
+/// Runs a call into redb; on a damaged tree redb may panic, which is damage and not our bug. Its words are of its own code.
 fn caught<T>(call: impl FnOnce() -> T) -> Result<T, String> {
-    std::panic::catch_unwind(std::panic::AssertUnwindSafe(call)).map_err(|payload| {
-        payload
-            .downcast_ref::<String>()
-            .cloned()
-            .or_else(|| payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
-            .unwrap_or_else(|| "unreadable tree".to_owned())
-    })
+    let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(call));
+    caught.map_err(|_| "its pages do not fit together".to_owned())
 }
 
 #[cfg(test)]

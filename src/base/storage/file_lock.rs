@@ -284,7 +284,8 @@ fn may_live(path: &Path) -> bool {
     !is_process_gone(&holder.host, holder.process)
 }
 
-fn holder(path: &Path) -> String {
+/// The process that a lock file names, in words.
+pub fn holder(path: &Path) -> String {
     match Holder::read(path) {
         Some(Holder { host, process, .. }) => format!("process {process} on {host}"),
         None => "another process".to_owned(),

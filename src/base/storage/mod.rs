@@ -47,7 +47,7 @@ pub use disk_path::DiskPath;
 pub use draft_pages::DraftPages;
 pub use error::StorageError;
 pub use file::StoreFile;
-pub use file_lock::{FileLock, Refused, host_name, is_process_gone};
+pub use file_lock::{FileLock, Refused, holder, host_name, is_process_gone};
 pub use flat::FlatPages;
 pub use free_space::available_bytes;
 pub use page_files::Backing;

@@ -12,6 +12,7 @@ const ESTIMATES: &[&str] = &[
 ];
 
 #[derive(Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("wanted").required(true).args(["tets", "factor"])))]
 #[command(after_help = "Examples:\n  tetdb adapt part.tetdb --field u --factor 2 --dry-run\n  \
     tetdb adapt part.tetdb --field u --tets 5M --hmin 0.1% --hgrad 1.5\n  \
     tetdb adapt part.tetdb --field displacement.z --estimate jump --factor 4 --memory 4GiB\n  \
@@ -27,7 +28,7 @@ pub struct AdaptArgs {
     #[arg(long, value_name = "HOW", value_parser = word_of::<ErrorEstimate>(ESTIMATES))]
     pub estimate: Option<ErrorEstimate>,
     /// Wanted number of tetrahedra, such as 800000, 500k, 5M or 1.2G
-    #[arg(long, value_name = "N", required_unless_present = "factor", conflicts_with = "factor", value_parser = number_of)]
+    #[arg(long, value_name = "N", value_parser = number_of)]
     pub tets: Option<u64>,
     /// Wanted number of tetrahedra as a multiple of those there are
     #[arg(long, value_name = "F", allow_hyphen_values = true)]

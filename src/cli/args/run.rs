@@ -40,7 +40,7 @@ pub struct RunArgs {
     /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
-    /// Threads to use [default: all cores]
+    /// Threads to use, at most eight for each core or 64 [default: all cores]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub threads: Option<usize>,
     /// Skip the verification at the end

@@ -39,7 +39,7 @@ pub enum VersionAction {
 
 #[derive(Debug, clap::Args)]
 pub struct SaveArgs {
-    /// Its name: letters, digits, `_`, `-` and `.`
+    /// Its name: letters, digits, `_`, `-` and `.`, which does not come first
     #[arg(value_name = "NAME")]
     pub name: String,
     /// A note to list with it

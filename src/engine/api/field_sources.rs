@@ -10,7 +10,7 @@ use super::{Error, ExprError, Settings, VARIABLES};
 use tetdb_base::expr::{ExprKind, Expression};
 use tetdb_base::storage::{DiskPath, SortRecord, Sorted, Sorter, check_cancelled, sort_record};
 use tetdb_io::read::{FieldTable, FieldValue};
-use tetdb_io::write::each_vertex_number;
+use tetdb_io::write::{VertexPlace, each_vertex_place, leaves_out_vertices};
 use tetdb_schema::code::Code;
 use tetdb_schema::field::{FieldNumber, FieldPlace, FieldRow, Scalar};
 use tetdb_schema::ids::{Owner, SubdomainId, TetId, VertexId};
@@ -151,6 +151,8 @@ sort_record! {
     /// A vertex of a sub-domain and the key of its value.
     struct KeyedPlace {
         key: u64,
+        /// No tetrahedron has the vertex, so it may lack a value.
+        is_free: bool,
         /// Rank and number in the sub-domain.
         place: u64,
     }
@@ -191,7 +193,7 @@ where
     next: Option<Record<N>>,
     /// Number of all values.
     count: u64,
-    /// The last key that the mesh had.
+    /// The key of `next`, once the mesh had it.
     last: Option<u64>,
     place: Box<dyn Fn(u64) -> String>,
     show: fn(u64) -> String,
@@ -203,19 +205,25 @@ where
 {
     /// The value with this key; keys ascend, and may repeat. Errors: a key without a value, a value without a key.
     fn take(&mut self, key: u64) -> Result<Record<N>, Error> {
-        if self.last != Some(key) {
-            if self.last.is_some() {
-                self.advance()?;
-            }
-            self.last = Some(key);
+        self.find(key)?.ok_or_else(|| {
+            let message = format!("there is no value for {}", (self.show)(key));
+            bad(message).with_help("give a value for each, and each once")
+        })
+    }
+
+    /// As [`Joined::take`]; `None` for a key without a value.
+    fn find(&mut self, key: u64) -> Result<Option<Record<N>>, Error> {
+        if self.last.is_some_and(|last| last != key) {
+            self.advance()?;
+            self.last = None;
         }
         match self.next {
-            Some(record) if words_of(&record).next() == Some(key) => Ok(record),
-            Some(record) if words_of(&record).next() < Some(key) => Err(self.surplus(&record)),
-            _ => {
-                let message = format!("there is no value for {}", (self.show)(key));
-                Err(bad(message).with_help("give a value for each, and each once"))
+            Some(record) if words_of(&record).next() == Some(key) => {
+                self.last = Some(key);
+                Ok(Some(record))
             }
+            Some(record) if words_of(&record).next() < Some(key) => Err(self.surplus(&record)),
+            _ => Ok(None),
         }
     }
 
@@ -265,8 +273,11 @@ impl Given<'_> {
         let at_tets = self.row.place == FieldPlace::Tets;
         let mut joined = self.sorted::<N>(by_export, at_tets)?;
         let rows = catalog.subdomains()?;
+        let memory = self.memory as usize;
+        let is_dense =
+            by_export && rows.len() == 1 && !leaves_out_vertices(catalog, self.dir.path(), memory)?;
         // Here the keys ascend in the order of the store.
-        if at_tets || by_export && rows.len() == 1 {
+        if at_tets || is_dense {
             let key = |number: u64, mesh: Option<TetId>| match mesh {
                 Some(id) if !by_export => id.number(),
                 _ => number,
@@ -299,9 +310,12 @@ impl Given<'_> {
         let places = self.places(catalog, by_export)?;
         let mut sorter = Sorter::new(self.dir.clone(), self.memory);
         for keyed in places {
-            let KeyedPlace { key, place } = keyed?;
-            let value = joined.take(key)?;
-            let words: Vec<u64> = words_of(&value).skip(2).collect();
+            let KeyedPlace { key, is_free, place } = keyed?;
+            let value = if is_free { joined.find(key)? } else { Some(joined.take(key)?) };
+            let words: Vec<u64> = match value {
+                Some(value) => words_of(&value).skip(2).collect(),
+                None => vec![self.row.number.nothing(); self.row.components as usize],
+            };
             sorter.push(record::<N>(place, 0, &words))?;
         }
         joined.end()?;
@@ -390,28 +404,16 @@ impl Given<'_> {
     /// All vertices by key.
     fn places(&self, catalog: &mut Catalog, by_export: bool) -> Result<Sorted<KeyedPlace>, Error> {
         let mut sorter = Sorter::new(self.dir.clone(), self.memory);
-        if by_export {
-            each_vertex_number(
-                catalog,
-                self.dir.path(),
-                self.memory as usize,
-                |key, rank, local| sorter.push(KeyedPlace { key, place: place_of(rank, local) }),
-            )?;
-        } else {
-            for row in catalog.subdomains()? {
-                let rank = row.rank;
-                let mut mesh = catalog.open_row(row, self.memory as usize)?;
-                for (local, vertex) in (0..).zip(mesh.vertices()) {
-                    sorter.push(KeyedPlace { key: vertex?.id, place: place_of(rank, local) })?;
-                }
-            }
-        }
+        let memory = self.memory as usize;
+        each_vertex_place(catalog, self.dir.path(), memory, |vertex| {
+            let VertexPlace { id, number, rank, local } = vertex;
+            // No value has the greatest number.
+            let key = if by_export { number.unwrap_or(u64::MAX) } else { id };
+            let place = u64::from(rank) << 32 | u64::from(local);
+            sorter.push(KeyedPlace { key, is_free: number.is_none(), place })
+        })?;
         Ok(sorter.finish()?)
     }
-}
-
-fn place_of(rank: u32, local: u32) -> u64 {
-    u64::from(rank) << 32 | u64::from(local)
 }
 
 /// Numbers of the records of a chunk.

@@ -82,7 +82,8 @@ impl NewField {
             let expected = self.components.map_or("1, 3, 6 or 9".to_owned(), |n| n.to_string());
             return Err(bad(format!(
                 "the values of {name} have {components} numbers, expected {expected}"
-            )));
+            ))
+            .with_help("1 number is a scalar, 3 are a vector, 6 or 9 a tensor; such as -y, x, 0"));
         }
         let number = self.number.unwrap_or(number);
         Ok(FieldRow { id: 0, name: name.clone(), place: self.place, number, components })

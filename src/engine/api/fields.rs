@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::error::Remedy;
 use super::field_sources::{FieldSource, SharedVertices, with_words};
 use super::field_spec::{NewField, Words, bad, packed};
 use super::store::open_to_change;
@@ -19,6 +20,9 @@ use tetdb_store::store::Catalog;
 const CACHE_BYTES: usize = 2 << 20;
 /// Least and greatest memory of a file being written, and of the sub-domain that it lines up with.
 const FILE_BYTES: [u64; 2] = [4 << 20, 64 << 20];
+/// Help for a step that a full disk ended.
+const NOTHING_CHANGED: &str = "free some space, then do it again; the store is as it was before";
+
 /// A field of a store.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
@@ -196,6 +200,10 @@ impl Store {
             let done = change(&mut catalog, self.settings())?;
             catalog.close()?;
             Ok(done)
+        })
+        .map_err(|error| match error.code() {
+            Code::DiskFull => error.with_help(NOTHING_CHANGED).with_remedy(Remedy::AsSaid),
+            _ => error,
         })?;
         self.reopen()?;
         Ok(done)
@@ -238,7 +246,11 @@ pub(super) fn field_called(catalog: &mut Catalog, name: &str) -> Result<FieldRow
             true => "the store has none".to_owned(),
             false => format!("there are {}", names.join(", ")),
         };
-        Error::new(Code::NoSuchPart, format!("there is no field {name}; {known}"))
+        let help = match names.is_empty() {
+            true => "add a field to the store first",
+            false => "take the name of one that is there",
+        };
+        Error::new(Code::NoSuchPart, format!("there is no field {name}; {known}")).with_help(help)
     })
 }
 

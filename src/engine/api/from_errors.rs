@@ -103,6 +103,10 @@ impl From<StoreError> for Error {
             StoreError::Changed { .. } => Code::StoreChanged,
             StoreError::NotFound { .. } => Code::NoSuchStore,
             StoreError::NoSubdomain { .. } | StoreError::NoVersion { .. } => Code::NoSuchPart,
+            StoreError::NotOurs { reason, .. } if reason == StoreError::BARELY_BEGUN => {
+                return Self::new(Code::NotAStore, &e)
+                    .with_help("there is nothing to go on with; run it again from the start");
+            }
             StoreError::NotOurs { .. } => Code::NotAStore,
             StoreError::Finished { .. } => Code::StoreExists,
             StoreError::Unfinished { .. } => Code::StoreUnfinished,
@@ -222,6 +226,14 @@ impl From<PipelineError> for Error {
             PipelineError::TaskFile { .. } => Self::new(Code::TaskFile, &e)
                 .with_help("gather again, which writes orders anew, then do the task again")
                 .with_remedy(Remedy::General),
+            PipelineError::Option { option: "subdomains", .. } => {
+                let help = "give 1 or more; without it the number follows from the expected mesh";
+                Self::new(Code::Usage, &e).with_option(Some("subdomains")).with_help(help)
+            }
+            PipelineError::Option { option: "task", .. } => {
+                let help = "the store's summary has the numbers of its tasks";
+                Self::new(Code::Usage, &e).with_option(Some("task")).with_help(help)
+            }
             other => Self::new(Code::Usage, &other).with_option(other.option()),
         }
     }

@@ -18,6 +18,7 @@ pub fn guarded<T>(
     settings: &Settings,
     work: impl FnOnce() -> Result<T, Error>,
 ) -> Result<T, Error> {
+    settings.check_threads()?;
     let context = RunContext::new(settings.n_threads(), settings.cancel.clone());
     guarded_in(&context, work)
 }

@@ -182,8 +182,18 @@ impl Store {
             let (clock, state) = (Instant::now(), catalog.state()?);
             let rows = catalog.periodic()?;
             let Some(row) = rows.iter().find(|row| row.labels == numbers) else {
-                let message = format!("there is no pair {}={}", labels.first, labels.second);
-                return Err(Error::new(Code::NoSuchPart, message));
+                let known = periodic_of(catalog)?;
+                let names: Vec<String> =
+                    known.iter().map(|pair| format!("{}={}", pair.first, pair.second)).collect();
+                let (known, help) = match names.is_empty() {
+                    true => ("the store has none".to_owned(), "there is nothing to drop"),
+                    false => {
+                        (format!("there are {}", names.join(", ")), "name one of these to drop it")
+                    }
+                };
+                let message =
+                    format!("there is no pair {}={}; {known}", labels.first, labels.second);
+                return Err(Error::new(Code::NoSuchPart, message).with_help(help));
             };
             Ok(catalog.commit(|step| {
                 step.remove_periodic(row);

@@ -73,7 +73,7 @@ impl Settings {
         self
     }
 
-    /// Sets the number of threads. The threads end with the run.
+    /// Sets the number of threads, up to [`Settings::threads_max`]. The threads end with the run.
     pub fn threads(mut self, n: usize) -> Self {
         self.threads = Some(n);
         self
@@ -116,11 +116,26 @@ impl Settings {
         self.scratch.clone().unwrap_or_else(std::env::temp_dir)
     }
 
+    /// The most threads that a run may have on this machine: 64, or eight for each core if that is more. More only take memory and time.
+    pub fn threads_max() -> usize {
+        (8 * n_cores()).max(64)
+    }
+
     /// Number of threads of the run.
     pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(|| {
-            std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
-        })
+        self.threads.unwrap_or_else(n_cores)
+    }
+
+    /// Errors: `usage` if the number of threads is zero or above [`Settings::threads_max`].
+    pub(super) fn check_threads(&self) -> Result<(), Error> {
+        let most = Self::threads_max();
+        let message = match self.threads {
+            Some(0) => "no thread is left to work".to_owned(),
+            Some(n) if n > most => format!("{n} threads are more than {most}"),
+            _ => return Ok(()),
+        };
+        let help = format!("allow from 1 to {most} threads; there are {} cores here", n_cores());
+        Err(Error::new(Code::Usage, message).with_help(help))
     }
 
     /// The cap and its origin, in words.
@@ -136,13 +151,9 @@ impl Settings {
 
     /// The cap in bytes.
     ///
-    /// Errors: `memory` if the cap is below the minimum of any run; `usage` if the number of threads is zero.
+    /// Errors: `memory` if the cap is below the minimum of any run; `usage` if no run may have so many threads.
     pub fn cap(&self) -> Result<u64, Error> {
-        if self.threads == Some(0) {
-            return Err(
-                Error::new(Code::Usage, "no thread is left to work").with_help("allow one or more")
-            );
-        }
+        self.check_threads()?;
         match self.memory {
             None => Ok(default_cap().0),
             Some(Bytes(bytes)) if bytes < MEMORY_MIN => {
@@ -195,4 +206,9 @@ impl Settings {
         let total = Some(total);
         self.say(&Event::Progress { stage, done, total, unit });
     }
+}
+
+/// Cores that this process may use.
+fn n_cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }

@@ -9,7 +9,7 @@ use super::tasks_status::{GatherReport, TaskStatus, task_ranges};
 use super::{Error, Settings, guarded, job};
 use crate::pipeline::{self, Performed, TASKS_MAX, TaskSettings};
 use tetdb_base::storage::{Budget, host_name};
-use tetdb_store::store::Catalog;
+use tetdb_store::store::{Catalog, StoreError};
 
 /// Default time that an expected file may be late. Cluster file systems may cache the contents of a folder for up to a minute.
 const WAIT: Duration = Duration::from_secs(60);
@@ -92,13 +92,14 @@ impl Tasks {
         })
     }
 
-    /// Runs a task. Returns `false` if the task was already done. The store's catalog is not opened.
+    /// Runs a task. Returns `false` if the task was already done. The store's catalog is opened only if no tasks are planned.
     ///
-    /// Errors: `no-tasks` if the stage of the task has not begun; `task-file`; errors of a run, with the name of this machine.
+    /// Errors: `no-tasks` if the stage of the task has not begun or the store is finished; `task-file`; errors of a run, with the name of this machine.
     pub fn run(&self, task: u32) -> Result<bool, Error> {
         guarded(&self.settings, || {
             let budget = Budget::new(self.settings.cap()?);
             let watch = self.settings.watcher();
+            self.refuse_finished()?;
             let done = pipeline::perform(&self.store, task, &self.how, &budget, &watch);
             let done = done.map_err(|error| {
                 let mut error = Error::from(error);
@@ -147,6 +148,26 @@ impl Tasks {
     /// Reports the progress of the tasks; `None` if none are planned. Nothing is changed. Errors: damage.
     pub fn status(&self) -> Result<Option<TaskStatus>, Error> {
         Ok(pipeline::status(&self.store)?.map(TaskStatus::from))
+    }
+
+    /// Errors: `no-tasks` for a store without a plan that is finished, where waiting for the plan would not help; `no-such-store`.
+    fn refuse_finished(&self) -> Result<(), Error> {
+        if pipeline::is_planned(&self.store) {
+            return Ok(());
+        }
+        let is_finished = match Catalog::open(&self.store) {
+            Ok(mut catalog) => catalog.state()?.is_finished(),
+            Err(error @ StoreError::NotFound { .. }) => return Err(error.into()),
+            // Another process writes it, or it is not all there yet.
+            Err(_) => false,
+        };
+        match is_finished {
+            false => Ok(()),
+            true => {
+                let message = format!("{} is finished: no task is left", self.store.display());
+                Err(Error::new(Code::NoTasks, message).with_help("go on with the finished mesh"))
+            }
+        }
     }
 
     fn open(&self) -> Result<Catalog, Error> {

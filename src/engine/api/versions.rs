@@ -123,7 +123,7 @@ impl Store {
     /// Saves the store as it is as a version, in one step. No file is copied: a version keeps files from being removed.
     ///
     /// With `keep`, the oldest versions beyond that number are dropped. Returns their names. Errors: `bad-version` for a name that is taken, or
-    /// none: 1 to 64 letters, digits, `_`, `-` and `.`, but not `now`; `busy`; the disk.
+    /// none: 1 to 64 letters, digits, `_`, `-` and `.`, but no `.` at the beginning and not `now`; `busy`; the disk.
     pub fn save_version(
         &mut self,
         name: &str,
@@ -242,10 +242,13 @@ fn bad(message: String) -> Error {
 
 fn check_name(name: &str, others: &[(u32, VersionRow)]) -> Result<(), Error> {
     let is_known = |c: char| c.is_alphanumeric() || "_-.".contains(c);
-    if !(1..=NAME_MAX).contains(&name.chars().count()) || !name.chars().all(is_known) || name == NOW
-    {
-        let help = format!("take up to {NAME_MAX} letters, digits, _, - and . but not {NOW}");
-        return Err(bad(format!("'{name}' is no name of a version")).with_help(help));
+    let is_long = !(1..=NAME_MAX).contains(&name.chars().count());
+    // `..` and hidden files are names of paths.
+    if is_long || !name.chars().all(is_known) || name.starts_with('.') || name == NOW {
+        let help = format!(
+            "take up to {NAME_MAX} letters, digits, _, - and . but no . at the beginning, and not {NOW}"
+        );
+        return Err(bad(format!("{name:?} is no name of a version")).with_help(help));
     }
     match others.iter().any(|(_, row)| row.name == name) {
         true => Err(bad(format!("there is a version {name} already"))

@@ -50,7 +50,7 @@ pub use seal::totals::prepared_row;
 pub use tasks::serve;
 pub use tasks::{
     Gathered, Performed, Planned, Stage, StageKind, TASKS_MAX, TaskSettings, TaskState, end_plan,
-    gather, is_being_worked, perform, plan as plan_tasks, status,
+    gather, is_being_worked, is_planned, perform, plan as plan_tasks, status,
 };
 pub use tetdb_schema::work::{WorkKind, from_bytes, to_bytes};
 pub use tree::bounds;

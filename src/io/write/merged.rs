@@ -13,8 +13,10 @@ use super::embedded::{WrittenEmbedded, memory_left};
 use super::error::{Result, WriteError};
 use super::faces::{FaceSorter, FaceSource, MergedFace, MergedFaces};
 use super::merged_fields::{FieldChunk, fits_doubles, has_values_at, open_fields};
-use super::merged_parts::{collect_faces, misplaced, required_faces, sources};
-use super::numbering::{Numbering, PartNumbers, Sharer, Source, shareable_vertices, sharers};
+use super::merged_parts::{collect_faces, misplaced, required_faces};
+use super::numbering::{
+    Numbering, PartNumbers, Sharer, Source, shareable_vertices, sharers, sources,
+};
 use super::read_progress::ReadProgress;
 use super::scope::{FaceSet, Scope};
 use tetdb_base::shape::excess_near;

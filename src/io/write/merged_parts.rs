@@ -1,41 +1,13 @@
-//! Preparations of the merged mesh: its sub-domains, their boundary faces and required faces.
+//! Preparations of the merged mesh: boundary faces and required faces of its sub-domains.
 
 use std::path::Path;
 
 use super::error::Result;
 use super::faces::{FaceSorter, FaceSource};
-use super::numbering::{Source, Subset};
-use super::scope::{FaceSet, Scope};
+use super::scope::FaceSet;
 use tetdb_base::storage::check_cancelled;
 use tetdb_schema::record::NO_TET;
 use tetdb_store::sealed::{FaceJoin, FaceJoinSorter, SealedError, Subdomain};
-use tetdb_store::store::Catalog;
-
-/// The sub-domains in `scope` and their written subsets; a sub-domain without written tetrahedra is left out.
-pub(super) fn sources(
-    store: &mut Catalog,
-    scope: Scope,
-    dir: &Path,
-    memory: usize,
-) -> Result<Vec<Source>> {
-    let mut sources = Vec::new();
-    for row in store.subdomains()? {
-        if !scope.holds(row.rank) {
-            continue;
-        }
-        let mut source = Source::from(row);
-        if !scope.regions.is_empty() {
-            let path = dir.join(format!("subset-{}", source.row.rank));
-            let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
-            [source.n_tets, source.n_vertices] = Subset::gather(&mut part, scope.regions, &path)?;
-            source.subset = Some(path);
-        }
-        if source.n_tets > 0 || scope.regions.is_empty() {
-            sources.push(source);
-        }
-    }
-    Ok(sources)
-}
 
 /// Gathers the faces of a sub-domain's tetrahedra that are required: input triangles, and support triangles of embedded edges. Errors: damage, the disk.
 pub(super) fn required_faces(part: &mut Subdomain, dir: &Path, memory: u64) -> Result<FaceJoin> {

@@ -57,6 +57,7 @@ mod surface;
 mod tests;
 mod tetgen;
 mod topology;
+mod vertex_places;
 mod vtk;
 mod writers;
 mod xdmf;
@@ -83,11 +84,11 @@ pub use surface::{SurfaceWritten, check_surface_format, surface, wires};
 pub use vtk::{SelectedTet, SelectedVtu, defects};
 
 use merged::Merged;
-pub use numbering::each_vertex_number;
 use output_files::{OutputFiles, STDOUT};
 use scope::{FaceSet, Scope};
 use tetdb_base::storage::attempt;
 use tetdb_store::store::{Catalog, StoreError};
+pub use vertex_places::{VertexPlace, each_vertex_place, leaves_out_vertices};
 pub use writers::Writers;
 use writers::is_first;
 

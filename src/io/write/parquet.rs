@@ -4,6 +4,7 @@
 //! in the order of the store, along a Hilbert curve. A field has a column for each component, such as `u.x`. Each group of rows has the least and greatest value of each column, so that programs read
 //! only the groups of a box of space.
 
+use std::collections::BTreeSet;
 use std::fs::OpenOptions;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -19,8 +20,10 @@ use tetdb_schema::field::{FieldNumber, FieldPlace, FieldRow};
 use tetdb_schema::ids::TetId;
 
 use super::merged_fields::{FieldChunk, open_fields};
+use super::numbering::{Subset, sources};
 use super::output_files::OutputFiles;
 use super::pieces::piece_path;
+use super::scope::Scope;
 use super::{ExportSelection, FileCounts, Result, WriteError};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::check_cancelled;
@@ -165,13 +168,20 @@ pub(super) fn write(
     memory: usize,
     report: &dyn Fn(u64, u64),
 ) -> Result<FileCounts> {
-    let mut rows = store.subdomains()?;
-    rows.retain(|row| selection.writes_piece(row.rank));
-    let all: u64 = rows.iter().map(|row| row.tets).sum();
+    let mine: BTreeSet<u32> = (store.subdomains()?.iter().map(|row| row.rank))
+        .filter(|&rank| selection.writes_piece(rank))
+        .collect();
+    let scope = Scope { ranks: &mine, ..Scope::WHOLE };
+    let sources = match mine.is_empty() {
+        true => Vec::new(),
+        false => sources(store, scope, outputs.dir(), memory)?,
+    };
+    let all: u64 = sources.iter().map(|source| source.n_tets).sum();
     let (at_vertices, at_tets): (Vec<_>, Vec<_>) =
         store.fields()?.into_iter().partition(|field| field.place == FieldPlace::Vertices);
     let mut counts = FileCounts::default();
-    for row in rows {
+    for source in sources {
+        let row = &source.row;
         let mut part = store.open_subdomain(row.rank, memory / 2)?;
         let piece = piece_path(out, row.rank, "parquet");
         let mut table = Table::create(outputs, &piece, (TETS, &at_tets), row.tets * 32)?;
@@ -191,13 +201,14 @@ pub(super) fn write(
         tets.write(&mut table, row.rank, &mut fields)?;
         table.finish()?;
         counts.tets += row.tets;
-        counts.vertices += row.vertices;
+        counts.vertices += source.n_vertices;
         let name = piece.file_stem().unwrap_or_default().to_string_lossy();
         let beside = piece.with_file_name(format!("{name}_vertices.parquet"));
         let schema = (VERTICES, &*at_vertices);
-        let mut table = Table::create(outputs, &beside, schema, row.vertices * 24)?;
+        let mut table = Table::create(outputs, &beside, schema, source.n_vertices * 24)?;
         let files = open_fields(store, &at_vertices, &part)?;
-        vertices(&mut part, &mut table, files, FieldColumns::new(&at_vertices))?;
+        let fields = (files, FieldColumns::new(&at_vertices));
+        vertices(&mut part, source.subset()?, &mut table, fields)?;
         table.finish()?;
     }
     Ok(counts)
@@ -260,18 +271,24 @@ impl Tets {
     }
 }
 
+/// Writes the vertices of `subset`, or all.
 fn vertices(
     part: &mut Subdomain,
+    subset: Option<Subset>,
     table: &mut Table,
-    mut files: Vec<FieldFile>,
-    mut fields: FieldColumns,
+    (mut files, mut fields): (Vec<FieldFile>, FieldColumns),
 ) -> Result<()> {
     let (mut ids, mut h, mut tags) = (Vec::new(), Vec::new(), Vec::new());
     let mut points: [Vec<f64>; 3] = Default::default();
     let last = part.row().chunks[1];
     for (done, chunk) in (1..).zip(part.vertex_chunks()) {
         let values = FieldChunk::read(&mut files, done - 1)?;
-        for (i, vertex) in chunk?.records.into_iter().enumerate() {
+        let chunk = chunk?;
+        for (i, vertex) in chunk.records.into_iter().enumerate() {
+            let local = chunk.first + i as u32;
+            if subset.as_ref().is_some_and(|subset| subset.vertices.rank(local).is_none()) {
+                continue;
+            }
             fields.push(&values.row(i));
             ids.push(vertex.id as i64);
             for (column, x) in points.iter_mut().zip(vertex.point) {

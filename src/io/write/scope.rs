@@ -26,7 +26,14 @@ pub(super) struct Scope<'s> {
     pub apart: bool,
 }
 
+/// Stands for all sub-domains and all regions.
+static ALL: BTreeSet<u32> = BTreeSet::new();
+
 impl Scope<'_> {
+    /// All sub-domains and regions, with the input triangles.
+    pub const WHOLE: Self =
+        Scope { ranks: &ALL, regions: &ALL, faces: FaceSet::Skin, apart: false };
+
     /// Returns whether a sub-domain is written.
     pub fn holds(&self, rank: u32) -> bool {
         self.ranks.is_empty() || self.ranks.contains(&rank)

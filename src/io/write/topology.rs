@@ -2,17 +2,18 @@
 //!
 //! JSON. `subdomains`: `id`, `tets`, `vertices`, `neighbors` (`id`, `faces`). `pairs`: for each two sub-domains that share a vertex, `low` and
 //! `high`, their numbers; `vertices`, two lists of equal length with the number of each shared vertex in the one and in the other; `faces`, the same
-//! with the tetrahedra on both sides of each shared face. Numbers are those of the store and of the pieces.
+//! with the tetrahedra on both sides of each shared face. Numbers are those of the pieces.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::numbering::{Source, shareable_vertices};
+use super::numbering::{Source, shareable_vertices, sources};
 use super::output_files::OutputFiles;
+use super::scope::Scope;
 use super::stream::Stream;
 use super::{FileCounts, Result};
 use tetdb_base::storage::{Sorted, Sorter, sort_record};
-use tetdb_schema::catalog::{NeighborRow, SubdomainRow};
+use tetdb_schema::catalog::NeighborRow;
 use tetdb_store::sealed::{MergeReader, SealedError};
 use tetdb_store::store::Catalog;
 
@@ -45,26 +46,24 @@ pub(super) fn write(
     out: &Path,
     memory: usize,
 ) -> Result<FileCounts> {
-    let rows = store.subdomains()?;
-    let sources: Vec<Source> = rows.iter().cloned().map(Source::from).collect();
     let dir = outputs.dir().to_owned();
+    let sources = sources(store, Scope::WHOLE, &dir, memory)?;
     let vertices = shared_vertices(store, &sources, &dir, memory)?;
-    let faces = shared_faces(store, &rows, &dir, memory)?;
+    let faces = shared_faces(store, &sources, &dir, memory)?;
     let neighbors: BTreeMap<u32, Vec<NeighborRow>> =
         (store.topology()?.into_iter()).map(|row| (row.subdomain, row.neighbors)).collect();
     let path = outputs.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
     stream.text("{\"schema\": 1, \"subdomains\": [");
-    for (i, row) in rows.iter().enumerate() {
+    for (i, Source { row, n_vertices, .. }) in sources.iter().enumerate() {
         let before = if i > 0 { "," } else { "" };
         let neighbors: Vec<_> = (neighbors.get(&row.rank).into_iter().flatten())
             .map(|n| format!("{{\"id\": {}, \"faces\": {}}}", n.subdomain, n.faces))
             .collect();
         stream.text(&format!(
-            "{before}\n{{\"id\": {}, \"tets\": {}, \"vertices\": {}, \"neighbors\": [{}]}}",
+            "{before}\n{{\"id\": {}, \"tets\": {}, \"vertices\": {n_vertices}, \"neighbors\": [{}]}}",
             row.rank,
             row.tets,
-            row.vertices,
             neighbors.join(", ")
         ));
         stream.end()?;
@@ -160,12 +159,12 @@ fn shared_vertices(
 /// Interface faces by pair.
 fn shared_faces(
     store: &mut Catalog,
-    rows: &[SubdomainRow],
+    sources: &[Source],
     dir: &Path,
     memory: usize,
 ) -> Result<Sorted<SharedFace>> {
     let mut sorter = Sorter::new(dir, memory as u64 / 4);
-    for &SubdomainRow { rank, .. } in rows {
+    for rank in sources.iter().map(|source| source.row.rank) {
         let mut part = store.open_subdomain(rank, memory / 4)?;
         for face in part.interfaces() {
             let face = face?;

@@ -24,6 +24,9 @@ const POOR: f64 = 0.55;
 /// Triangles below this quality (15 degrees) are divided where nothing else helps.
 const NEEDLE: f64 = 0.4;
 
+/// Passes of a round, for progress.
+const PASSES: usize = 8;
+
 /// Operations that all threads evaluate before their changes are applied: with more, more are evaluated twice; with less, threads wait.
 const BATCH: usize = 512;
 
@@ -44,21 +47,23 @@ fn each<T>(items: impl IntoIterator<Item = T>, mut visit: impl FnMut(T)) {
 impl Remesher<'_> {
     /// Runs all passes; false if there would be more triangles than `triangles_max`. `progress` gets the share that is done.
     pub fn run(&mut self, triangles_max: usize, progress: &dyn Fn(f64)) -> bool {
+        let all = (ROUNDS * PASSES + LAST_ROUNDS) as f64;
+        progress(0.0);
         self.flips();
         for round in 0..ROUNDS {
-            progress(round as f64 / (ROUNDS + 2) as f64);
-            self.collapses();
-            self.flips();
-            if !self.splits(triangles_max) {
-                return false;
+            for pass in 0..PASSES {
+                progress((round * PASSES + pass) as f64 / all);
+                match pass {
+                    0 | 4 => self.collapses(),
+                    2 if !self.splits(triangles_max) => return false,
+                    2 => {}
+                    6 => self.moves(2),
+                    _ => self.flips(),
+                }
             }
-            self.flips();
-            self.collapses();
-            self.flips();
-            self.moves(2);
-            self.flips();
         }
-        for _ in 0..LAST_ROUNDS {
+        for round in 0..LAST_ROUNDS {
+            progress((ROUNDS * PASSES + round) as f64 / all);
             if self.poor() == 0 {
                 break;
             }

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use crate::store::{Catalog, StoreError};
 use tetdb_base::storage::check_cancelled;
-use tetdb_schema::catalog::{CoarseRow, SubdomainRow};
+use tetdb_schema::catalog::{CoarseRow, FileRow, SubdomainRow};
 use tetdb_schema::field::FieldPart;
 
 /// Memory for chunks and redb's cache.
@@ -34,19 +34,27 @@ pub(super) fn snapshot_damage(store: &mut Catalog) -> Result<Vec<StoreError>, St
     Ok(found.0)
 }
 
-/// Lists the damage in the sub-domains that a version would bring back. Errors: as [`damage`].
+/// Lists the damage in the sub-domains and fields that a version would bring back. Errors: as [`damage`].
 pub fn damage_of_version(store: &mut Catalog, number: u32) -> Result<Vec<StoreError>, StoreError> {
     let mut found = DamageFound(Vec::new());
     if let Some(version) = store.versions()?.get(&number) {
-        let (now, mut then) = (store.subdomains()?, store.at(version));
-        for row in then.subdomains()?.into_iter().filter(|row| !now.contains(row)) {
-            found.add_part(&mut then, row)?;
-        }
+        let mut then = store.at(version);
+        let mut known = Known::default();
+        known.meshes.extend(store.subdomains()?.iter().map(SubdomainRow::file));
+        known.values.extend(store.field_parts()?.iter().map(FieldPart::file));
+        found.add_state(&mut then, &mut known)?;
     }
     Ok(found.0)
 }
 
 struct DamageFound(Vec<StoreError>);
+
+/// Files of sub-domains and of fields that need not be read any more.
+#[derive(Default)]
+struct Known {
+    meshes: BTreeSet<FileRow>,
+    values: BTreeSet<FileRow>,
+}
 
 impl DamageFound {
     /// Lists damage; returns other errors. Returns whether there was no damage.
@@ -91,28 +99,31 @@ impl DamageFound {
 
     /// The fields of the store, and all that versions have besides.
     fn add_versions(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
-        let (mut meshes, mut values) = (BTreeSet::new(), BTreeSet::new());
-        meshes.extend(store.subdomains()?.iter().map(SubdomainRow::file));
+        let mut known = Known::default();
+        known.meshes.extend(store.subdomains()?.iter().map(SubdomainRow::file));
         let mut states = vec![store.share()];
         states.extend(store.versions()?.values().map(|version| store.at(version)));
-        for mut store in states {
-            let parts = store.field_parts()?;
-            for row in store.subdomains()? {
-                if meshes.insert(row.file()) {
-                    self.add_part(&mut store, row.clone())?;
+        states.iter_mut().try_for_each(|store| self.add_state(store, &mut known))
+    }
+
+    /// The sub-domains and fields of a state, but for `known` files; its own become known.
+    fn add_state(&mut self, store: &mut Catalog, known: &mut Known) -> Result<(), StoreError> {
+        let parts = store.field_parts()?;
+        for row in store.subdomains()? {
+            if known.meshes.insert(row.file()) {
+                self.add_part(store, row.clone())?;
+            }
+            for field in store.fields()? {
+                let is_its = |part: &&FieldPart| (part.field, part.rank) == (field.id, row.rank);
+                let mut its = parts.iter().find(is_its).into_iter();
+                if its.any(|part| !known.values.insert(part.file())) {
+                    continue;
                 }
-                for field in store.fields()? {
-                    let is_its =
-                        |part: &&FieldPart| (part.field, part.rank) == (field.id, row.rank);
-                    if parts.iter().find(is_its).is_some_and(|part| !values.insert(part.file())) {
-                        continue;
-                    }
-                    // A damaged sub-domain is listed elsewhere.
-                    let Ok(mesh) = store.open_row(row.clone(), MEMORY_BYTES) else { break };
-                    let opened = store.open_field(&field, &mesh, MEMORY_BYTES);
-                    let checked = opened.and_then(|mut values| Ok(values.check()?));
-                    self.note(checked)?;
-                }
+                // A damaged sub-domain is listed elsewhere.
+                let Ok(mesh) = store.open_row(row.clone(), MEMORY_BYTES) else { break };
+                let opened = store.open_field(&field, &mesh, MEMORY_BYTES);
+                let checked = opened.and_then(|mut values| Ok(values.check()?));
+                self.note(checked)?;
             }
         }
         Ok(())

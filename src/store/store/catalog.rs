@@ -15,7 +15,7 @@ use tetdb_schema::row::{self as rows, FORMAT_MAGIC, RowKind, blob_key, is_versio
 use super::writer_lock::{LOCK, WriterLock};
 use super::{Step, StoreError};
 use crate::sealed::{CoarseSnapshot, Form, SealedError, Subdomain};
-use tetdb_base::storage::{DiskPath, FileId, StoreFile};
+use tetdb_base::storage::{DiskPath, FileId, StoreFile, holder};
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
     SubdomainRow, TopologyRow, VersionRow, WiresRow,
@@ -117,7 +117,14 @@ impl Catalog {
     /// Errors: [`StoreError::NotFound`], [`StoreError::NotOurs`], [`StoreError::Busy`] while it is unfinished and written,
     /// [`StoreError::Format`].
     pub fn open(dir: impl Into<DiskPath>) -> Result<Self, StoreError> {
-        Self::open_as(&dir.into(), false)
+        let dir = dir.into();
+        Self::open_as(&dir, false).map_err(|error| match error {
+            StoreError::Busy { .. } => {
+                let (path, writer) = (dir.path().to_owned(), holder(&dir.path().join(LOCK)));
+                StoreError::Busy { path, writer }
+            }
+            other => other,
+        })
     }
 
     /// Opens a store for writing, and removes files that an interrupted step left.
@@ -194,9 +201,7 @@ impl Catalog {
         }
         if !path.is_file() {
             let reason = match dir.join(CATALOG_NEW).exists() {
-                true => {
-                    "its creation was interrupted at the start; meshing into it begins it again"
-                }
+                true => StoreError::BARELY_BEGUN,
                 false => "it has no catalog",
             };
             return Err(StoreError::NotOurs { path: dir.path().to_owned(), reason });

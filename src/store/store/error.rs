@@ -112,6 +112,10 @@ pub enum StoreError {
 }
 
 impl StoreError {
+    /// Reason of [`StoreError::NotOurs`] for a store without its first commit.
+    pub const BARELY_BEGUN: &str =
+        "its creation was interrupted at the start; meshing into it begins it again";
+
     /// Returns whether the store was changed after it was written.
     pub fn is_damage(&self) -> bool {
         match self {

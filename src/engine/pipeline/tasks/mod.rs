@@ -29,4 +29,4 @@ pub use perform::{Performed, TaskSettings, perform};
 pub use schedule::{Stage, StageKind, TASKS_MAX};
 pub use serve::serve;
 pub(super) use serve::{ask, begin, wrong_receipt};
-pub use status::{Planned, TaskState, is_being_worked, status};
+pub use status::{Planned, TaskState, is_being_worked, is_planned, status};

@@ -130,6 +130,11 @@ fn is_alive(mark: &TaskMark) -> bool {
         && !is_process_gone(&mark.host, mark.process)
 }
 
+/// Returns whether tasks of the store at `store` are planned.
+pub fn is_planned(store: &Path) -> bool {
+    TaskFolder::of(Catalog::work_dir_at(store)).plan_path().is_file()
+}
+
 /// Returns the number and host of a task of the store at `store` that is running, if there is one.
 pub fn is_being_worked(store: &Path) -> Result<Option<(u32, String)>, PipelineError> {
     let running = |(task, state)| match state {

@@ -4,6 +4,7 @@
 //! become positions. Second-order tetrahedra are taken by their corners. Lines and points are counted; other volume cells are errors.
 
 mod abaqus;
+mod companion;
 mod gmsh;
 mod gmsh_data;
 mod gmsh_sink;
@@ -42,8 +43,10 @@ pub fn read_tets(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<
     mesh.stem = super::stem(path);
     let is = |ending| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
     if is("npy") || is("vtkhdf") {
-        let read = if is("npy") { npy::read } else { vtkhdf::read };
-        read(path, fields, mesh)?;
+        match is("npy") {
+            true => npy::read(path, fields, mesh)?,
+            false => companion::read_both(path, vtkhdf::open, fields, mesh)?,
+        }
         mesh.end();
         return Ok(());
     }
@@ -63,7 +66,10 @@ pub fn read_tets(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<
         Some(Format::Medit) => medit::read(open(path, limit)?, false, mesh)?,
         Some(Format::MeditBinary) => medit::read(open(path, limit)?, true, mesh)?,
         Some(Format::Gmsh) => gmsh::read(open(path, limit)?, fields, mesh)?,
-        Some(Format::VtkXml) => vtu::read(path, fields, mesh)?,
+        Some(Format::VtkXml) => {
+            let open = |path: &Path, cap| vtu::Grid::open(path, cap / 16);
+            companion::read_both(path, open, fields, mesh)?;
+        }
         Some(Format::TetgenEle) => tetgen::read(path, limit, mesh)?,
         Some(Format::Abaqus) => abaqus::read(open(path, limit)?, mesh)?,
         _ => return Err(place.refuse(ENDINGS)),

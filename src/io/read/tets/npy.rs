@@ -74,6 +74,9 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
             let label = mesh.labels.number(next(&mut labels)?);
             mesh.triangle(corners, label);
         }
+        if labels.is_some() {
+            mesh.notes.push("labels have numbers for names: arrays hold no others".to_owned());
+        }
         labels.into_iter().chain([corners]).try_for_each(Numbers::end)?;
     }
     Ok(())

@@ -10,14 +10,14 @@ use hdf5_reader::{Dataset, FileStorage, Hdf5File, OpenOptions};
 
 use super::hdf_rows::kind;
 use super::vtu::{ArrayAt, Grid, Piece};
-use super::{FilePlace, MeshFields, RawMesh, ReadError, ReadFault, Result};
+use super::{FilePlace, ReadError, ReadFault, Result};
 
 /// Bytes of an array of a partition, with its names.
 const PIECE_ARRAY_BYTES: u64 = 256;
 
-/// Reads a file. Errors: what is no such grid; time steps; more partitions than the memory holds.
-pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
-    let cap = mesh.space.cap() as usize;
+/// Finds the arrays of a file. Errors: what is no such grid; time steps; more partitions than a memory of `cap` bytes holds.
+pub fn open(path: &Path, cap: u64) -> Result<Grid> {
+    let cap = cap as usize;
     let place = FilePlace::new(path);
     std::fs::File::open(path).map_err(|e| place.refuse(ReadFault::Unreadable(e.to_string())))?;
     let options = OpenOptions::default()
@@ -27,7 +27,9 @@ pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
     let open = || Hdf5File::from_storage_with_options(Arc::new(FileStorage::open(path)?), options);
     let file = open().map_err(|e| refuse(&place, "an HDF5 file", &e))?;
     let pieces = pieces(&file, cap as u64 / 16, &place)?;
-    Grid::of_hdf(path, file, pieces).read(fields, mesh)
+    let root = file.group("VTKHDF").map_err(|e| refuse(&place, "a group VTKHDF", &e))?;
+    let texts = group_arrays(&root, "FieldData", &place)?;
+    Ok(Grid::of_hdf(path, file, pieces, texts))
 }
 
 fn refuse(place: &FilePlace, what: &str, error: &hdf5_reader::error::Error) -> ReadError {
@@ -110,15 +112,21 @@ fn arrays(file: &Hdf5File, root: &Group, place: &FilePlace) -> Result<Vec<ArrayA
         arrays.extend(array(section, name.to_owned(), path.to_owned(), &dataset));
     }
     for section in ["PointData", "CellData"] {
-        let Ok(group) = root.group(section) else { continue };
-        let datasets = group.datasets().map_err(|e| refuse(place, section, &e))?;
-        for dataset in datasets {
-            let name = dataset.name().rsplit('/').next().unwrap_or_default().to_owned();
-            let path = format!("VTKHDF/{section}/{name}");
-            arrays.extend(array(section, name, path, &dataset));
-        }
+        arrays.extend(group_arrays(root, section, place)?);
     }
     Ok(arrays)
+}
+
+/// The arrays of numbers of a group; none where there is no such group.
+fn group_arrays(root: &Group, section: &str, place: &FilePlace) -> Result<Vec<ArrayAt>> {
+    let Ok(group) = root.group(section) else { return Ok(Vec::new()) };
+    let datasets = group.datasets().map_err(|e| refuse(place, section, &e))?;
+    let found = datasets.iter().filter_map(|dataset| {
+        let name = dataset.name().rsplit('/').next().unwrap_or_default().to_owned();
+        let path = format!("VTKHDF/{section}/{name}");
+        array(section, name, path, dataset)
+    });
+    Ok(found.collect())
 }
 
 /// Compares the rows of all arrays with the points, cells, corners and offsets of all partitions.

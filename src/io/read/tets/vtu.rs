@@ -20,6 +20,8 @@ use tetdb_schema::field::FieldPlace;
 
 /// Longest tag that is read.
 const TAG_MAX: u64 = 1 << 16;
+/// Longest text that is read: a million names of 64 letters.
+const TEXT_MAX: u64 = 1 << 26;
 
 /// An array of a piece.
 #[derive(Clone)]
@@ -66,23 +68,21 @@ pub struct Grid {
     path: std::path::PathBuf,
     layout: Layout,
     appended: Option<(u64, Coding)>,
-    pieces: Vec<Piece>,
+    pub(super) pieces: Vec<Piece>,
+    /// Texts of the whole, as bytes.
+    texts: Vec<ArrayAt>,
     hdf: Option<Hdf5File>,
 }
 
-pub fn read(path: &Path, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
-    let grid = Grid::open(path, mesh.space.cap() / 16)?;
-    grid.read(fields, mesh)
-}
-
 impl Grid {
-    /// Reads the pieces into a mesh.
+    /// Reads the pieces into a mesh. Errors: those of the file.
     pub(super) fn read(&self, fields: MeshFields, mesh: &mut RawMesh) -> Result<()> {
         let taken = self.values(fields, mesh);
+        let names = self.names("region_names")?;
         let (mut first, mut n_ghosts) = (0, 0);
         for piece in &self.pieces {
             self.points(piece, &taken, mesh)?;
-            n_ghosts += self.cells(piece, first, fields, &taken, mesh)?;
+            n_ghosts += self.cells(piece, first, fields, (&taken, &names), mesh)?;
             first += piece.n_points;
         }
         if n_ghosts > 0 {
@@ -149,7 +149,8 @@ impl Grid {
         FilePlace { file: self.name.clone(), spot: Spot::Byte(at) }.refuse(fault)
     }
 
-    fn open(path: &Path, block_max: u64) -> Result<Self> {
+    /// Finds the arrays of a file. Errors: what is no such grid.
+    pub(super) fn open(path: &Path, block_max: u64) -> Result<Self> {
         if unpacked_name(path) != path {
             let what = "a packed .vtu, which is read at several places at once,".to_owned();
             return Err(FilePlace::new(path).refuse(ReadFault::Unsupported(what)));
@@ -161,6 +162,7 @@ impl Grid {
             layout: Layout { is_big: false, header: 4, is_packed: false, block_max },
             appended: None,
             pieces: Vec::new(),
+            texts: Vec::new(),
             hdf: None,
         };
         let (mut at, mut sections, mut is_vtk) = (0, Vec::<String>::new(), false);
@@ -194,8 +196,7 @@ impl Grid {
                     break;
                 }
                 ("DataArray", false) => {
-                    if let (Some(section), Some(piece)) = (sections.last(), grid.pieces.last_mut())
-                    {
+                    if let Some(section) = sections.last() {
                         let text = |key| tag.get(key).unwrap_or_default().to_owned();
                         let offset = tag.get("offset").and_then(|n| n.parse().ok());
                         let array = ArrayAt {
@@ -205,9 +206,13 @@ impl Grid {
                             n_components: text("NumberOfComponents").parse().unwrap_or(1),
                             format: text("format"),
                             at: offset.unwrap_or(at),
-                            rows: 0,
+                            rows: text("NumberOfTuples").parse().unwrap_or(0),
                         };
-                        piece.arrays.push(array);
+                        match grid.pieces.last_mut() {
+                            _ if section == "FieldData" => grid.texts.push(array),
+                            Some(piece) => piece.arrays.push(array),
+                            None => {}
+                        }
                     }
                 }
                 (name, false) if !tag.is_empty => sections.push(name.to_owned()),
@@ -243,18 +248,31 @@ impl Grid {
     }
 
     /// The pieces of an HDF5 file.
-    pub fn of_hdf(path: &Path, file: Hdf5File, pieces: Vec<Piece>) -> Self {
+    pub fn of_hdf(path: &Path, file: Hdf5File, pieces: Vec<Piece>, texts: Vec<ArrayAt>) -> Self {
         Self {
             name: path.to_string_lossy().into_owned(),
             path: path.to_owned(),
             layout: Layout { is_big: false, header: 0, is_packed: false, block_max: 0 },
             appended: None,
             pieces,
+            texts,
             hdf: Some(file),
         }
     }
 
-    fn numbers(&self, array: &ArrayAt, what: &'static str) -> Result<Numbers> {
+    /// Names by number, a zero after each, from a text of the whole; nothing where the file has no such text.
+    pub(super) fn names(&self, text: &str) -> Result<Vec<String>> {
+        let is_text = |a: &&ArrayAt| a.name == text && a.kind == "UInt8" && a.rows < TEXT_MAX;
+        let Some(array) = self.texts.iter().find(is_text) else { return Ok(Vec::new()) };
+        let mut numbers = self.numbers(array, "a byte of a text")?;
+        let bytes: Vec<u8> =
+            (0..array.rows).map(|_| Ok(numbers.integer()? as u8)).collect::<Result<_>>()?;
+        let names = bytes.split(|&byte| byte == 0);
+        Ok(names.map(|name| String::from_utf8_lossy(name).into_owned()).collect())
+    }
+
+    /// Opens the numbers of an array.
+    pub(super) fn numbers(&self, array: &ArrayAt, what: &'static str) -> Result<Numbers> {
         if let Some(file) = &self.hdf {
             let place = FilePlace::new(&self.path);
             let rows = file.dataset(&array.format);
@@ -353,7 +371,7 @@ impl Grid {
         piece: &Piece,
         first: u64,
         fields: MeshFields,
-        taken: &[TakenArray],
+        (taken, names): (&[TakenArray], &[String]),
         mesh: &mut RawMesh,
     ) -> Result<u64> {
         if piece.n_cells == 0 {
@@ -393,7 +411,11 @@ impl Grid {
             match (kind, n) {
                 (10, 4) | (24, 10) | (71, 4..) => {
                     mesh.n_curved += u64::from(n > 4);
-                    let region = mesh.regions.number(region);
+                    let name = || match fields.region {
+                        None => name_of(names, region),
+                        Some(_) => String::new(),
+                    };
+                    let region = mesh.regions.with_name(region, name);
                     let part = if parts.is_some() { mesh.parts.number(part) } else { 0 };
                     mesh.tet(corners, region, part).map_err(|fault| types.place().refuse(fault))?;
                     push_row(&values, mesh, &row);
@@ -417,6 +439,12 @@ impl Grid {
         lists.chain(values.into_iter().map(|(_, numbers)| numbers)).try_for_each(Numbers::end)?;
         Ok(n_ghosts)
     }
+}
+
+/// The name of a number; empty where there is none.
+pub(super) fn name_of(names: &[String], number: i64) -> String {
+    let place = usize::try_from(number).ok();
+    place.and_then(|place| names.get(place)).cloned().unwrap_or_default()
 }
 
 /// The next vertex of a cell. Errors: the piece has no such vertex.

@@ -162,7 +162,8 @@ impl ProcessorFiles<'_> {
                         zones.push(zone, files.written() as u32, is_flipped)?;
                     }
                     known.record(&(*next as u32).to_le_bytes())?;
-                    files.inner(face.owner, face.neighbor, face.vertices)
+                    let vertices = numbers.all_in_part(face.vertices)?;
+                    files.inner(face.owner, face.neighbor, vertices)
                 }
                 WithTwoCells::Across(upper) => {
                     for (rank, other) in [(rank, upper.other), (upper.other, rank)] {
@@ -185,7 +186,7 @@ impl ProcessorFiles<'_> {
             *start += 1;
             if let Some(files) = &mut files {
                 known.record(&(*start as u32).to_le_bytes())?;
-                files.outer(face.owner, face.vertices)?;
+                files.outer(face.owner, numbers.all_in_part(face.vertices)?)?;
             }
         }
         known.finish()?;
@@ -199,7 +200,7 @@ impl ProcessorFiles<'_> {
             }
             // Both sides begin with the vertex that has the least number in the whole, and go round in opposite directions.
             let in_whole = numbers.vertices(face.vertices)?;
-            let mut vertices = face.vertices;
+            let mut vertices = numbers.all_in_part(face.vertices)?;
             vertices.rotate_left((0..3).min_by_key(|&i| in_whole[i]).unwrap_or(0));
             files.outer(face.owner, vertices)?;
         }
@@ -257,14 +258,17 @@ impl ProcessorFiles<'_> {
         let what = (dir.as_path(), "points", "vectorField");
         let mut points = FoamFile::create(outputs, what, "", ascii, 24 * size.points)?;
         points.list(size.points, |file| {
-            for vertex in part.vertices() {
-                file.point(vertex?.point)?;
+            for (local, vertex) in (0..).zip(part.vertices()) {
+                let vertex = vertex?;
+                if numbers.in_part(local).is_some() {
+                    file.point(vertex.point)?;
+                }
             }
             Ok(())
         })?;
         points.finish()?;
         write_labels(outputs, (&dir, "pointProcAddressing"), size.points, ascii, |file| {
-            (0..size.points as u32).try_for_each(|v| file.label(numbers.vertices([v])?[0] as i32))
+            (0..size.points as u32).try_for_each(|v| file.label(numbers.dense_vertex(v) as i32))
         })?;
         write_labels(outputs, (&dir, "cellProcAddressing"), size.cells, ascii, |file| {
             (0..size.cells as u32).try_for_each(|cell| file.label((first_tet + cell) as i32))

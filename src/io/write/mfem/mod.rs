@@ -84,26 +84,30 @@ fn write_part(
     sets: &[String; 2],
     end: impl FnOnce(&mut Stream) -> Result<()>,
 ) -> Result<FileCounts> {
-    let part = &mut opened.part;
+    let OpenedPart { part, numbers } = opened;
     let counts = FileCounts {
-        vertices: part.row().vertices,
+        vertices: numbers.n_in_part(),
         tets: part.row().tets,
         triangles: each_facet(part, support_first, |_| Ok(()))?,
     };
     let mut stream = begin(outputs, out, counts)?;
     for tet in part.tets() {
         let tet = tet?.1;
-        let nodes = tet.nodes.map(u64::from);
+        let nodes = numbers.all_in_part(tet.nodes)?.map(u64::from);
         element(&mut stream, tet.region.into(), TETRAHEDRON, &nodes)?;
     }
     boundary(&mut stream, counts.triangles, sets);
     each_facet(part, support_first, |facet| {
-        let nodes = outward(facet.vertices.map(u64::from), facet.regions);
+        let nodes = numbers.all_in_part(facet.vertices)?.map(u64::from);
+        let nodes = outward(nodes, facet.regions);
         element(&mut stream, u64::from(facet.label) + 1, TRIANGLE, &nodes)
     })?;
     vertices(&mut stream, counts.vertices, sets);
-    for vertex in part.vertices() {
-        point(&mut stream, vertex?.point)?;
+    for (local, vertex) in (0..).zip(part.vertices()) {
+        let vertex = vertex?;
+        if numbers.in_part(local).is_some() {
+            point(&mut stream, vertex.point)?;
+        }
     }
     stream.text("\nmfem_serial_mesh_end\n");
     end(&mut stream)?;

@@ -44,7 +44,8 @@ fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
         let OpenedPart { mut part, numbers, .. } = mesh.open_part(p)?;
         let mut push = |face: [u32; 3]| -> Result<()> {
             let [i, j, k] = numbers.vertices(face)?;
-            let mut ends = [(i, face[0]), (j, face[1]), (k, face[2])];
+            let [u, v, w] = numbers.all_in_part(face)?;
+            let mut ends = [(i, u), (j, v), (k, w)];
             ends.sort_unstable();
             let [a, b, c] = ends;
             for ends in [[a; 3], [b; 3], [c; 3], [a, b, b], [a, c, c], [b, c, c], ends] {

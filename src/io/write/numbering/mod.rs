@@ -2,23 +2,24 @@
 //!
 //! A shared vertex has the same id in each of its sub-domains, and the sub-domain of lowest rank numbers it. Four external sorts treat the
 //! few vertices that can be shared: by id (the sub-domains that share one), by place (its number), by group (its number for the others), by
-//! place again (a table for each sub-domain). `subset` numbers some tetrahedra of a sub-domain and their vertices, `corners` the vertices
-//! of chosen elements.
+//! place again (a table for each sub-domain). `source` finds what is written of each sub-domain, and `subset` numbers it;
+//! `corners` numbers the vertices of chosen elements.
 
 mod corners;
+mod source;
 mod subset;
 
 use std::path::{Path, PathBuf};
 
 pub(super) use corners::{CornerSorter, DenseCorners};
+pub(super) use source::{Source, sources};
 pub(super) use subset::Subset;
 
-use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 
 use super::error::Result;
 use super::stream::{RecordReader, save};
-use tetdb_base::storage::{Sorted, Sorter, StorageError, sort_record};
+use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_store::sealed::{MergeReader, SealedError};
 use tetdb_store::store::Catalog;
 
@@ -67,31 +68,6 @@ sort_record! {
     }
 }
 
-/// A sub-domain of which all or some is written.
-#[derive(Clone)]
-pub(super) struct Source {
-    pub row: SubdomainRow,
-    /// Tetrahedra and vertices that are written.
-    pub n_tets: u64,
-    pub n_vertices: u64,
-    /// Scratch file of the subset, unless all is written.
-    pub subset: Option<PathBuf>,
-}
-
-impl Source {
-    /// The written subset; `None` stands for all. Errors: the disk.
-    pub fn subset(&self) -> Result<Option<Subset>> {
-        let load = |path| Subset::load(path, self.row.tets);
-        self.subset.as_deref().map(load).transpose()
-    }
-}
-
-impl From<SubdomainRow> for Source {
-    fn from(row: SubdomainRow) -> Self {
-        Self { n_tets: row.tets, n_vertices: row.vertices, row, subset: None }
-    }
-}
-
 /// Numbers of all vertices.
 ///
 /// Shape: `firsts[p]` = number of the first own vertex of part `p`, `shared[p]` = number of its vertices that
@@ -123,10 +99,15 @@ impl PartNumbers {
     /// The number of vertex `local`; `None` where it is not written.
     #[inline]
     pub fn vertex(&self, local: u32) -> Option<u64> {
+        Some(self.dense_vertex(self.in_part(local)?))
+    }
+
+    /// The number of vertex `local` among those of the part that are written; `None` where it is not.
+    #[inline]
+    pub fn in_part(&self, local: u32) -> Option<u32> {
         match &self.subset {
-            None if local < self.n_locals => Some(self.dense_vertex(local)),
-            None => None,
-            Some(subset) => Some(self.dense_vertex(subset.vertices.rank(local)?)),
+            None => (local < self.n_locals).then_some(local),
+            Some(subset) => subset.vertices.rank(local),
         }
     }
 
@@ -143,9 +124,24 @@ impl PartNumbers {
     /// The numbers of the vertices of a record that is written. Errors: damage, where the record names a vertex that is not written.
     #[inline]
     pub fn vertices<const N: usize>(&self, locals: [u32; N]) -> Result<[u64; N]> {
+        let numbers = self.all_in_part(locals)?;
+        Ok(numbers.map(|local| self.dense_vertex(local)))
+    }
+
+    /// Number of vertices of the part that are written.
+    pub fn n_in_part(&self) -> u64 {
+        match &self.subset {
+            None => self.n_locals.into(),
+            Some(subset) => subset.vertices.n(),
+        }
+    }
+
+    /// As [`PartNumbers::vertices`], among those of the part that are written.
+    #[inline]
+    pub fn all_in_part<const N: usize>(&self, locals: [u32; N]) -> Result<[u32; N]> {
         let mut numbers = [0; N];
         for (number, local) in numbers.iter_mut().zip(locals) {
-            *number = self.vertex(local).ok_or_else(|| self.names(&locals))?;
+            *number = self.in_part(local).ok_or_else(|| self.names(&locals))?;
         }
         Ok(numbers)
     }
@@ -301,26 +297,6 @@ impl Numbering {
         }
         Ok(part)
     }
-}
-
-/// Calls `each` with the number that an export gives each vertex, the rank of its sub-domain and its number there, in the order of these.
-///
-/// Holds about `memory` bytes, and keeps scratch files in `dir`. Errors: damage, the disk; those of `each`.
-pub fn each_vertex_number(
-    store: &mut Catalog,
-    dir: &Path,
-    memory: usize,
-    mut each: impl FnMut(u64, u32, u32) -> std::result::Result<(), StorageError>,
-) -> Result<()> {
-    let parts: Vec<Source> = store.subdomains()?.into_iter().map(Source::from).collect();
-    let numbering = Numbering::new(store, &parts, false, dir, memory)?;
-    for (p, source) in parts.iter().enumerate() {
-        let numbers = numbering.part(store, &parts, p)?;
-        for local in 0..source.row.vertices as u32 {
-            each(numbers.dense_vertex(local), source.row.rank, local)?;
-        }
-    }
-    Ok(())
 }
 
 /// All vertices that are written and that another sub-domain may also have, by id.

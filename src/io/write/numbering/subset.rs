@@ -1,4 +1,4 @@
-//! The tetrahedra of some regions in a sub-domain, and their vertices: two sets of numbers.
+//! The written tetrahedra of a sub-domain, and their vertices: two sets of numbers.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -26,6 +26,12 @@ impl RankedSet {
         Self { words, before }
     }
 
+    /// Number of members.
+    pub fn n(&self) -> u64 {
+        let last = self.before.last().zip(self.words.last());
+        last.map_or(0, |(before, word)| u64::from(before + word.count_ones()))
+    }
+
     /// Number of members below `number`; `None` where it is no member.
     #[inline]
     pub fn rank(&self, number: u32) -> Option<u32> {
@@ -36,25 +42,27 @@ impl RankedSet {
     }
 }
 
-/// The tetrahedra of some regions in one sub-domain, and their vertices.
+/// The tetrahedra of one sub-domain that are written, all or those of some regions, and their vertices.
 pub(in crate::write) struct Subset {
     pub tets: RankedSet,
     pub vertices: RankedSet,
 }
 
 impl Subset {
-    /// Finds the subset in one pass and saves it at `path`; returns the numbers of tetrahedra and vertices. Errors: damage, the disk.
+    /// Finds the tetrahedra of these regions, or all when there are none, and saves them with their vertices at `path`; returns the numbers of both.
+    ///
+    /// Errors: damage, the disk.
     pub fn gather(part: &mut Subdomain, regions: &BTreeSet<u32>, path: &Path) -> Result<[u64; 2]> {
         let n_vertices = part.row().vertices;
         let (mut tets, mut vertices) = (BitSet::new(part.row().tets), BitSet::new(n_vertices));
         for chunk in 0..part.tet_summaries().len() {
             let [least, greatest] = part.tet_summaries()[chunk].regions;
-            if regions.range(least..=greatest).next().is_none() {
+            if !regions.is_empty() && regions.range(least..=greatest).next().is_none() {
                 continue;
             }
             let chunk = part.tet_chunk(chunk as u32)?;
             for (local, tet) in (chunk.first..).zip(&chunk.records) {
-                if regions.contains(&tet.region) {
+                if regions.is_empty() || regions.contains(&tet.region) {
                     tets.insert(local.into());
                     for v in tet.nodes {
                         if u64::from(v) >= n_vertices {
