@@ -72,8 +72,8 @@ impl RemeshSizes {
                 (limits, Some(values(lengths, ranks, open, settings.cap()?)?))
             }
         };
-        let (fields, requested) = fields(given, values.is_some(), (open, options), settings)?;
-        let (field, base) = fields.map_or((None, None), |(field, base)| (Some(field), base));
+        let has_lengths = values.is_some();
+        let ([field, base], requested) = fields(given, has_lengths, (open, options), settings)?;
         let mut requested =
             OptionsText::from_sizes(&requested.sizes, requested.size_field.as_ref());
         if let Some(Lengths::File(file)) = lengths {
@@ -86,19 +86,19 @@ impl RemeshSizes {
     }
 }
 
-/// The field of the given sizes combined with the recorded ones, and for an imported mesh that of the recorded ones alone; `None` if
+/// The field of the given sizes combined with the recorded ones, and for an imported mesh that of the recorded ones alone; none if
 /// lengths one by one replace it. Also returns the given sizes for the record.
 fn fields(
     given: Option<(SizeOptions, Option<SizeFile>)>,
     has_lengths: bool,
     (open, options): (&mut Catalog, &Options),
     settings: &Settings,
-) -> Result<(Option<(SizeField, Option<SizeField>)>, MeshOptions), Error> {
+) -> Result<([Option<SizeField>; 2], MeshOptions), Error> {
     let is_given = given.is_some();
     let (sizes, size_field) = given.unwrap_or_default();
     let mut requested = MeshOptions { sizes, size_field, ..MeshOptions::default() };
     if !is_given || has_lengths {
-        return Ok((None, requested));
+        return Ok(([None, None], requested));
     }
     job::identify_sizes(&mut requested)?;
     let mut all = options.clone();
@@ -113,7 +113,7 @@ fn fields(
     };
     let (field, note) = field_of_surface(open, &all, settings)?;
     settings.note(note);
-    Ok((Some((field, base)), requested))
+    Ok(([Some(field), base], requested))
 }
 
 /// The size field of the surface that a store was made from, or of the shells of an imported one, with these options, and a summary.
