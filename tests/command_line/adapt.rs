@@ -82,6 +82,29 @@ fn lengths_follow_known_second_derivatives() {
     assert!(number(&narrow["sizes"][0]) > 0.0399 && number(&narrow["sizes"][1]) < 0.066);
 }
 
+/// Of a steep field all lengths are at a limit for many factors; those in between are found all the same.
+#[test]
+fn lengths_of_steep_fields_are_found_between_limits() {
+    let place = Place::new();
+    place.run_line("mesh sample:box,h=0.05 -o a.tetdb --subdomains 2 --no-verify").succeeds();
+    for (field, slope) in [("u", 100), ("v", 60)] {
+        let line = format!("field a.tetdb add {field} --at vertices --from exp(-{slope}*x)");
+        place.run_line(&line).succeeds();
+        for factor in [1.0, 1.5] {
+            let line = format!("adapt a.tetdb --field {field} --factor {factor} --hmin 0.013");
+            let answer = place.run_line(&format!("{line} --dry-run --json")).succeeds().json();
+            let plan = &answer["plan"];
+            let share = number(&plan["predicted_tets"]) / number(&plan["wanted_tets"]);
+            assert!((share - 1.0).abs() < 0.02, "{field}, {factor}: {plan}");
+        }
+    }
+    // Where the limits allow no such number, it is the nearest.
+    let line = "adapt a.tetdb --field u --factor 100 --hmin 0.03 --dry-run --json";
+    let plan = place.run_line(line).succeeds().json()["plan"].clone();
+    assert!(number(&plan["predicted_tets"]) < 0.1 * number(&plan["wanted_tets"]), "{plan}");
+    assert!((number(&plan["sizes"][0]) - 0.03).abs() < 1e-9, "{plan}");
+}
+
 /// The number of tetrahedra is about the one asked for, the error below that of a uniform mesh of as many, and `--undo` brings back all.
 #[test]
 fn tetrahedra_are_as_many_as_asked_for_and_where_they_are_needed() {

@@ -156,6 +156,47 @@ fn imported_sub_domains_are_meshed_again() {
     }
 }
 
+/// Lengths are those of the file's tetrahedra, in each region, not those of the faces around them. They stay on record.
+#[test]
+fn regions_of_a_file_keep_their_lengths() {
+    let place = Place::new();
+    let sizes = "--size-region 1,0.09 --size-region 2,0.2";
+    place
+        .run_line(&format!("mesh sample:shells,count=2,h=0.4 -o a.tetdb --regions all {sizes}"))
+        .succeeds();
+    place.run_line("export a.tetdb a.meshb").succeeds();
+    place.run_line("import a.meshb -o b.tetdb").succeeds();
+    let tets = || {
+        let info = place.run_line("info b.tetdb --json").succeeds().json();
+        [0, 1].map(|region| info["regions"][region]["tets"].as_f64().expect("a number"))
+    };
+    let before = tets();
+    let check = |case: &str, factor: f64, within: f64| {
+        let [outer, inner] = tets();
+        let wanted = before.map(|n| n * factor);
+        let is_near = |n: f64, wanted: f64| (wanted / within..wanted * within).contains(&n);
+        let is_near = is_near(outer, wanted[0]) && is_near(inner, wanted[1]);
+        assert!(is_near, "{case}: {outer} and {inner}, not {wanted:?}");
+    };
+    let line = "resaturate b.tetdb --subdomain 0 --refine-by 0.8";
+    let forecast = place.run_line(&format!("{line} --dry-run --json")).succeeds().json();
+    let predicted = forecast["subdomains"][0]["predicted_tets"].as_f64().expect("a number");
+    let all = before[0] + before[1];
+    assert!((1.6..2.3).contains(&(predicted / all)), "{predicted} from {all}: {forecast}");
+    place.run_line("resaturate b.tetdb --subdomain 0").succeeds();
+    check("as they were", 1.0, 1.2);
+    place.run_line(line).succeeds();
+    check("refined", 1.95, 1.2);
+    place.run_line("resaturate b.tetdb --undo").succeeds();
+    // What is new changes no other place.
+    place.run_line("resaturate b.tetdb --subdomain 0 --size-sphere 0,0,0,0.25,0.06").succeeds();
+    assert!(tets()[1] > 2.0 * before[1], "{:?} {before:?}", tets());
+    assert!((0.8..1.2).contains(&(tets()[0] / before[0])), "{:?} {before:?}", tets());
+    place.run_line("resaturate b.tetdb --undo").succeeds();
+    check("undone", 1.0, 1.2);
+    place.run_line("verify b.tetdb --full").succeeds();
+}
+
 /// Parts of a file may touch themselves at edges and vertices, and lie in pieces.
 #[test]
 fn parts_that_touch_themselves_are_meshed_again() {

@@ -6,6 +6,8 @@
 
 #[path = "../../tools/fuzz/src/file.rs"]
 mod file;
+#[path = "../../tools/fuzz/src/mesh.rs"]
+mod mesh;
 #[path = "../../tools/fuzz/src/mutate.rs"]
 mod mutate;
 #[path = "../../tools/fuzz/src/store.rs"]
@@ -52,6 +54,19 @@ fn seeds_of_readers_are_surfaces() {
             if !name.contains("found-") {
                 let surface = read_memory(format, &name, &bytes).unwrap_or_else(|e| panic!("{e}"));
                 assert!(surface.n_triangles() >= 4, "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn seeds_of_readers_of_meshes_are_meshes() {
+    for target in TARGETS.iter().filter(|t| ["vtkhdf", "vtu", "inp", "msh"].contains(&t.name)) {
+        for (path, bytes) in corpus(target) {
+            let name = path.to_string_lossy();
+            if !name.contains("found-") {
+                let mesh = mesh::read(target.name, &bytes).unwrap_or_else(|e| panic!("{e}"));
+                assert!(mesh.tets.len() >= 2, "{name}");
             }
         }
     }

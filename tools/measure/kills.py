@@ -2,14 +2,16 @@
 """Kills tetdb at random times (SIGKILL) and checks what is left: nothing may be lost, mixed or half written.
 
   kills.py mesh     TETDB STORE --subdomain LIST [--refine-by 0.9] [--kills 50] [--verify-every 10]
+  kills.py changes  TETDB FOLDER [--versions 200] [--fields 100]
   kills.py export   TETDB STORE FOLDER [--small FOLDER] [--kills 20]
   kills.py carriers TETDB FOLDER [--mpi PROGRAM=MPIRUN] [--ranks N] [--tasks N] [--gathers N] [--steps] [--slurm N] [--races N] [--late]
 
-`mesh` kills `tetdb resaturate`: the store has the old mesh or the new one. `export` kills `tetdb export` of every format, fills its disk,
+`mesh` kills `tetdb resaturate`: the store has the old mesh or the new one. `changes` does the same with versions and fields. `export` kills `tetdb export` of every format, fills its disk,
 and compares the pieces of many writers. `carriers` kills ranks of MPI, tasks and gathers. Each sub-command has its own --help.
 
   tetdb mesh sample:box,h=0.05 -o box.tetdb --subdomains 4
   kills.py mesh tetdb box.tetdb --subdomain 1 --kills 10
+  kills.py changes tetdb /tmp/changes --versions 6 --fields 4 --job sample:box,h=0.045
   kills.py export tetdb box.tetdb /tmp/exports --kills 3
   kills.py carriers tetdb /tmp/carriers --tasks 20 --gathers 10 --late
 
@@ -91,6 +93,89 @@ def mesh(args):
             if state() != old:
                 sys.exit(f"after kill {kill} undoing gave another mesh")
     print(json.dumps({"kills": args.kills, "seed": args.seed, "whole_s": round(whole, 2), **counts}))
+
+
+def changes(args):
+    """FOLDER is created and removed. A store gets two versions whose meshes differ, and a field. `version save`, `restore` and `drop`,
+    `field add` and `drop` are each killed at times drawn evenly from that of a whole run, timed before, and a third more. Five kills in
+    turn meet one store. After each, mesh, fields and versions are those of before or of after, `verify` passes for the store and for
+    all its versions, and once the change has gone through, there are as many files as without kills."""
+    draw, folder = random.Random(args.seed), os.path.abspath(args.folder)
+    store, first = os.path.join(folder, "store.tetdb"), os.path.join(folder, "first.tetdb")
+    os.makedirs(folder)
+
+    def call(*words):
+        done = subprocess.run([args.tetdb, *words], capture_output=True, text=True)
+        if done.returncode:
+            sys.exit(f"WRONG: {' '.join(words)}: exit {done.returncode}\n{done.stderr}")
+        return done.stdout
+
+    def state():
+        info = json.loads(call("info", store, "--json"))
+        versions = json.loads(call("version", store, "list", "--json"))["versions"]
+        times_apart = [{k: v for k, v in version.items() if k not in ("saved", "bytes")} for version in versions]
+        return json.dumps([info["digest"], info["fields"], times_apart]), [version["name"] for version in versions]
+
+    def files():
+        """How many there are of each, whatever their generation."""
+        names = sorted(name.rsplit("-g", 1)[0] for _, _, names in os.walk(store) for name in names)
+        return [name for name in names if not name.endswith(".lock")]
+
+    def begin():
+        shutil.rmtree(store, ignore_errors=True)
+        shutil.copytree(first, store)
+
+    call("mesh", *args.job.split(), "--subdomains", "4", "-o", first)
+    call("field", first, "add", "base", "--at", "tets", "--from", "quality")
+    call("version", first, "save", "a")
+    call("resaturate", first, "--subdomain", "1", "--refine-by", "0.8")
+    call("version", first, "save", "b")
+    call("resaturate", first, "--subdomain", "0,2", "--refine-by", "0.9")
+    n_tets = json.loads(call("info", first, "--json"))["tets"]
+    versions = [["version", store, "save", "c"], ["version", store, "restore", "a", "--no-verify"], ["version", store, "drop", "b"]]
+    fields = [["field", store, "add", "more", "--at", "tets", "--from", "x, y, z"], ["field", store, "drop", "base"]]
+    for group, n in ((versions, args.versions), (fields, args.fields)):
+        for number, change in enumerate(group):
+            begin()
+            old = state()[0]
+            begun = time.time()
+            call(*change)
+            whole, (new, _), kept = time.time() - begun, state(), files()
+            counts = {"hit": 0, "old": 0, "new": 0}
+            for kill in range(n * number // len(group), n * (number + 1) // len(group)):
+                if kill % 5 == 0:
+                    begin()
+                    begun = time.time()
+                    call(*change)
+                    whole = time.time() - begun
+                    begin()
+                child = subprocess.Popen([args.tetdb, *change], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                try:
+                    child.wait(draw.uniform(0, 1.3 * whole))
+                except subprocess.TimeoutExpired:
+                    child.kill()
+                    child.wait()
+                counts["hit"] += child.returncode == -9
+                found, names = state()
+                if found not in (old, new):
+                    sys.exit(f"WRONG: kill {kill} of {change[0]} {change[2]} left neither the old state nor the new one: {found}")
+                counts["old" if found == old else "new"] += 1
+                call("verify", store)
+                for name in names:
+                    call("verify", store, "--at-version", name)
+                if found == old and kill % 5 < 4:
+                    continue
+                if found == old:
+                    call(*change)
+                # What a killed writer left goes with the next one.
+                call("version", store, "save", "last")
+                call("version", store, "drop", "last")
+                if state()[0] != new or files() != kept:
+                    sys.exit(f"WRONG: after kills of {change[0]} {change[2]} there are {files()} instead of {kept}")
+                begin()
+            line = {"change": f"{change[0]} {change[2]}", "tets": n_tets, "whole_s": round(whole, 3), "files": len(kept), **counts}
+            print(json.dumps(line), flush=True)
+    shutil.rmtree(folder)
 
 
 def export(args):
@@ -488,6 +573,10 @@ def main():
     sub.add_argument("--refine-by", default="0.9")
     sub.add_argument("--kills", type=int, default=50)
     sub.add_argument("--verify-every", type=int, default=10)
+    sub = command(changes, "tetdb", "folder")
+    sub.add_argument("--versions", type=int, default=200)
+    sub.add_argument("--fields", type=int, default=100)
+    sub.add_argument("--job", default="sample:box,h=0.031")
     sub = command(export, "tetdb", "store", "folder")
     sub.add_argument("--small")
     sub.add_argument("--kills", type=int, default=20, help="of each format")

@@ -72,7 +72,8 @@ impl RemeshSizes {
                 (limits, Some(values(lengths, ranks, open, settings.cap()?)?))
             }
         };
-        let (field, requested) = field(given, values.is_some(), (open, options), settings)?;
+        let has_lengths = values.is_some();
+        let ([field, base], requested) = fields(given, has_lengths, (open, options), settings)?;
         let mut requested =
             OptionsText::from_sizes(&requested.sizes, requested.size_field.as_ref());
         if let Some(Lengths::File(file)) = lengths {
@@ -81,23 +82,23 @@ impl RemeshSizes {
         let requested = serde_json::to_value(&requested).unwrap_or_default();
         let refine_by = factor.map(|factor| factor.to_string());
         let requested = json!({ "options": requested, "refine_by": refine_by }).to_string();
-        Ok(Some(NewSizes { field, values, factor: scale, limits, beta, requested }))
+        Ok(Some(NewSizes { field, base, values, factor: scale, limits, beta, requested }))
     }
 }
 
-/// The field of the given sizes combined with the recorded ones; `None` if lengths one by one replace it. Also returns the given sizes
-/// for the record.
-fn field(
+/// The field of the given sizes combined with the recorded ones, and for an imported mesh that of the recorded ones alone; none if
+/// lengths one by one replace it. Also returns the given sizes for the record.
+fn fields(
     given: Option<(SizeOptions, Option<SizeFile>)>,
     has_lengths: bool,
     (open, options): (&mut Catalog, &Options),
     settings: &Settings,
-) -> Result<(Option<SizeField>, MeshOptions), Error> {
+) -> Result<([Option<SizeField>; 2], MeshOptions), Error> {
     let is_given = given.is_some();
     let (sizes, size_field) = given.unwrap_or_default();
     let mut requested = MeshOptions { sizes, size_field, ..MeshOptions::default() };
     if !is_given || has_lengths {
-        return Ok((None, requested));
+        return Ok(([None, None], requested));
     }
     job::identify_sizes(&mut requested)?;
     let mut all = options.clone();
@@ -105,16 +106,23 @@ fn field(
     if requested.size_field.is_some() {
         all.mesh.size_field.clone_from(&requested.size_field);
     }
-    Ok((Some(field_of_surface(open, &all, settings)?), requested))
+    // What is recorded of an imported mesh also has the lengths of the file's tetrahedra.
+    let base = match open.job()?.is_imported() {
+        true => Some(field_of_surface(open, options, settings)?.0),
+        false => None,
+    };
+    let (field, note) = field_of_surface(open, &all, settings)?;
+    settings.note(note);
+    Ok(([Some(field), base], requested))
 }
 
-/// The size field of the surface that a store was made from, or of the shells of an imported one, with these options. Errors: a changed
-/// surface.
+/// The size field of the surface that a store was made from, or of the shells of an imported one, with these options, and a summary.
+/// Errors: a changed surface.
 fn field_of_surface(
     open: &mut Catalog,
     all: &Options,
     settings: &Settings,
-) -> Result<SizeField, Error> {
+) -> Result<(SizeField, String), Error> {
     let (dir, cap) = (open.dir().to_owned(), settings.cap()?);
     let scratch = scratch_beside(&tetdb_base::surface::Surface::default(), cap, &dir)?;
     let job = open.job()?;
@@ -127,8 +135,7 @@ fn field_of_surface(
     };
     drop(scratch);
     let prepared = predict(&surface, all, cap, &dir)?;
-    settings.note(prepared.sizes.to_string());
-    Ok(prepared.field)
+    Ok((prepared.field, prepared.sizes.to_string()))
 }
 
 /// Errors: lengths in a region, which the shells of an imported mesh do not tell apart.

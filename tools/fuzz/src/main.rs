@@ -3,10 +3,12 @@
 //!
 //! Runs on stable Rust, without coverage: seeds are files of every shape a format has, mutations know numbers that readers
 //! trip over. An input that panics, ends the process, or takes longer than a second, is written beside the corpus as
-//! `TARGET/found-HASH`. Stores and their files are fed to a process of their own, for one that panics twice is gone.
+//! `TARGET/found-HASH`. Stores, their files, and files of HDF5 are fed to a process of their own, for one that panics
+//! twice or runs out of stack is gone.
 #![forbid(unsafe_code)]
 
 mod file;
+mod mesh;
 mod mutate;
 mod store;
 mod targets;
@@ -26,7 +28,7 @@ const HANGS: Duration = Duration::from_secs(60);
 /// So many findings are enough.
 const FOUND_MAX: u32 = 10;
 /// Targets whose inputs may end the process.
-const APART: [&str; 2] = ["file", "store"];
+const APART: [&str; 3] = ["file", "store", "vtkhdf"];
 /// Where a process that runs on behalf of another leaves each input before it runs it.
 const INPUT_FILE: &str = "TETDB_FUZZ_INPUT";
 

@@ -1,4 +1,4 @@
-//! What is fed with arbitrary bytes: every reader of surfaces, options and expressions, every decoder of pages and chunks.
+//! What is fed with arbitrary bytes: every reader of surfaces, some of meshes, options and expressions, every decoder of pages and chunks.
 //!
 //! A target may answer with any error. It may not panic, hang, or hold more than its input justifies.
 //! Bytes that cannot have been written are also given a valid head and checksum, or only the checksum would be tested.
@@ -54,6 +54,10 @@ pub const TARGETS: &[Target] = &[
     reader("poly", Format::TetgenPoly, |bytes| read(Format::TetgenPoly, bytes)),
     reader("3mf", Format::ThreeMf, |bytes| read(Format::ThreeMf, bytes)),
     reader("gii", Format::Gifti, |bytes| read(Format::Gifti, bytes)),
+    text("vtkhdf", |bytes| drop(crate::mesh::read("vtkhdf", bytes))),
+    text("vtu", |bytes| drop(crate::mesh::read("vtu", bytes))),
+    text("inp", |bytes| drop(crate::mesh::read("inp", bytes))),
+    text("msh", |bytes| drop(crate::mesh::read("msh", bytes))),
     text("expr", expression),
     text("config", config),
     text("option", option),

@@ -94,6 +94,7 @@ impl Case {
     pub fn change(&self, disk: &Arc<SimDisk>) -> Ended {
         let sizes = NewSizes {
             field: None,
+            base: None,
             values: None,
             factor: 0.8,
             limits: [0.0, f64::INFINITY],

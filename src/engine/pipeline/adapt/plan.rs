@@ -126,6 +126,7 @@ pub fn plan_adaptation(
         }
         let sizes = NewSizes {
             field: None,
+            base: None,
             values: Some(Values::Nearest(lengths.finish().freeze())),
             factor: 1.0,
             limits: request.limits,

@@ -87,17 +87,21 @@ pub fn sizes_for(
     scratch: &ScratchSpace,
 ) -> FoundSizes {
     let mut sizes = NodeSizes::new(mesh, relative, limits, scratch);
+    let ends = sizes.factors();
+    let [mut low, mut high] = ends;
     // Free of the skin the number goes with c⁻³.
-    let (mut low, mut high, mut slope) = (0.0, f64::INFINITY, -3.0);
+    let mut slope = -3.0;
     let mut last: Option<[f64; 2]> = None;
-    sizes.c = sizes.first_factor();
+    sizes.c = sizes.first_factor().clamp(low, high);
     let mut tets = sizes.tets();
+    let (mut is_flat, mut was_at_end) = (false, false);
     for _ in 0..STEPS_MAX {
         let [n, at] = [tets.iter().sum::<f64>() / n_tets, sizes.c].map(libm::log);
-        if n.abs() < NEAR {
+        // At the end limits and skin allow no more, or no less.
+        let end = ends[usize::from(n > 0.0)];
+        if n.abs() < NEAR || sizes.c == end {
             break;
         }
-        // Beyond a factor of the limits all lengths are at one of them.
         match n > 0.0 {
             true => low = f64::max(low, sizes.c),
             false => high = f64::min(high, sizes.c),
@@ -107,16 +111,16 @@ pub fn sizes_for(
         }
         last = Some([n, at]);
         let next = libm::exp(at - n / slope);
+        // Where a field is steep, all lengths may be at a limit for many factors, though not for all.
         sizes.c = match low < next && next < high {
-            true => next,
-            false => (low * high).sqrt(),
+            _ if is_flat && !was_at_end => end,
+            true if !is_flat => next,
+            _ => (low * high).sqrt(),
         };
+        was_at_end |= sizes.c == end;
         let before = tets;
         tets = sizes.tets();
-        // Limits and skin allow no more, or no less.
-        if tets == before {
-            break;
-        }
+        is_flat = tets == before;
     }
     let NodeSizes { relative, h, c, limits, .. } = sizes;
     FoundSizes { h, relative, c, limits, tets }
@@ -152,6 +156,25 @@ impl<'a> NodeSizes<'a> {
         }
         sizes.loads = sizes.loads_now();
         sizes
+    }
+
+    /// The least and the greatest factor of interest: above the greatest no length gets longer, below the least none gets shorter or some are
+    /// a millionth of what they may be.
+    fn factors(&mut self) -> [f64; 2] {
+        let (mut least, mut most) = (f64::INFINITY, 0.0f64);
+        for v in 0..self.mesh.n_nodes() {
+            let relative = self.relative.get(v);
+            if self.mesh.skin.get(v) == 0 && relative.is_normal() {
+                let [low, high] = self.cones.get(v);
+                least = least.min(low.max(self.limits.range[0]) / relative);
+                let high = high.min(self.limits.range[1]) / relative;
+                most = most.max(if high.is_finite() { high } else { 0.0 });
+            }
+        }
+        match most.is_normal() {
+            true => [least.clamp(1e-6 * most, most), most],
+            false => [1.0; 2],
+        }
     }
 
     /// Where the present lengths have the relative ones as mean, by load.

@@ -256,6 +256,7 @@ impl<'a> RemeshRun<'a> {
         let own: u64 = fields.values().flatten().map(of).sum();
         let sizes = self.what.sizes.as_ref();
         let requested = sizes.and_then(|s| s.field.as_ref()).map_or(0, of)
+            + sizes.and_then(|s| s.base.as_ref()).map_or(0, of)
             + sizes.and_then(|s| s.values.as_ref()).map_or(0, Values::bytes);
         // The fields of the sub-domains are also held as bytes until they are committed.
         let made: BTreeMap<u32, Vec<u8>> = (fields.iter())

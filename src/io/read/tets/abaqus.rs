@@ -1,18 +1,25 @@
 //! Meshes in input decks of Abaqus, `.inp`: `*NODE`, `*ELEMENT` of solid tetrahedra, `*ELSET` as regions, `*SURFACE` as labels.
 //!
 //! The set named by `*ELEMENT` or, behind it, by `*ELSET` is the region. A later set takes elements that are in the set of `*ELEMENT` alone.
+//! Sets and surfaces may name sets of `*ELSET` before them. Abaqus/CAE has one for each side of a surface, with the option `INTERNAL`.
 
 use std::collections::HashMap;
 use std::io::BufRead;
+use std::ops::Range;
 
 use super::raw::NodeNumbers;
 use super::{Feed, RawMesh, ReadFault, Result};
 use crate::read::fem::{integer, line, real, unexpected, unsupported};
 use crate::read::{FilePlace, feed};
 use tetdb_base::geom::{Point, counted};
+use tetdb_base::storage::SpillVecBuilder;
 
 /// Corners of the faces S1 to S4.
 const FACES: [[usize; 3]; 4] = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+
+/// Sets and surfaces that name sets may have so many members for each element of the file, where a few are usual. Without a limit, sets
+/// that name each other twice take all the disk.
+const NAMED_MAX: usize = 64;
 
 struct Deck<'a> {
     mesh: &'a mut RawMesh,
@@ -23,6 +30,13 @@ struct Deck<'a> {
     /// Region of elements or of a set, or label of a surface.
     group: u32,
     is_range: bool,
+    /// Positions of the tetrahedra of all sets of `*ELSET`, one set behind the other.
+    members: SpillVecBuilder<u32>,
+    /// Where the tetrahedra of a set are in `members`, by its name in capitals.
+    sets: HashMap<String, Vec<Range<usize>>>,
+    /// The set that is read, and whether it is a region.
+    set: String,
+    is_region: bool,
     /// Regions named by `*ELEMENT`, whose elements a set may take.
     of_elements: Vec<u32>,
     n_sets: u64,
@@ -33,13 +47,17 @@ struct Deck<'a> {
 
 pub fn read<R: BufRead>(mut feed: Feed<R>, mesh: &mut RawMesh) -> Result<()> {
     let mut deck = Deck {
+        members: mesh.space.builder(),
         mesh,
-        nodes: NodeNumbers::default(),
-        elements: NodeNumbers::default(),
+        nodes: NodeNumbers::of("node"),
+        elements: NodeNumbers::of("element"),
         keyword: String::new(),
         kind: String::new(),
         group: 0,
         is_range: false,
+        sets: HashMap::new(),
+        set: String::new(),
+        is_region: false,
         of_elements: Vec::new(),
         n_sets: 0,
         n_parts: 0,
@@ -63,7 +81,7 @@ pub fn read<R: BufRead>(mut feed: Feed<R>, mesh: &mut RawMesh) -> Result<()> {
             "*NODE" => deck.node(&text, &place)?,
             "*ELEMENT" => deck.element(&text, &place, &feed)?,
             "*ELSET" => deck.set(&text, &place, &feed)?,
-            "*SURFACE" => deck.surface(&text, &feed)?,
+            "*SURFACE" => deck.surface(&text, &place, &feed)?,
             "*INSTANCE" => return Err(unsupported(&place, "an instance that is moved")),
             _ => {}
         }
@@ -100,15 +118,19 @@ impl Deck<'_> {
             "*NODE" if options.get("SYSTEM").is_some_and(|s| !s.eq_ignore_ascii_case("R")) => {
                 return Err(unsupported(place, "coordinates that are not rectangular (SYSTEM)"));
             }
-            // Programs keep the sides of surfaces in such sets.
-            "*ELSET" if options.contains_key("INTERNAL") => self.keyword.clear(),
             "*ELEMENT" => {
                 self.kind = value("TYPE").to_ascii_uppercase();
                 self.group = self.mesh.regions.named(&value("ELSET"));
                 self.of_elements.push(self.group);
             }
             "*ELSET" => {
-                self.group = self.mesh.regions.named(&value("ELSET"));
+                self.set = value("ELSET").to_ascii_uppercase();
+                self.is_region = !options.contains_key("INTERNAL");
+                if self.is_region {
+                    self.group = self.mesh.regions.named(&value("ELSET"));
+                }
+                let n = self.members.len();
+                self.sets.entry(self.set.clone()).or_default().push(n..n);
                 self.is_range = options.contains_key("GENERATE");
             }
             "*SURFACE" => {
@@ -200,6 +222,7 @@ impl Deck<'_> {
 
     /// Puts elements into the set, unless they are in one.
     fn set<R: BufRead>(&mut self, text: &str, place: &FilePlace, feed: &Feed<R>) -> Result<()> {
+        self.elements.prepare(&self.mesh.space, feed)?;
         let words: Vec<&str> = text.split(',').map(str::trim).filter(|w| !w.is_empty()).collect();
         if self.is_range {
             let numbers = words.iter().map(|w| integer(w, place)).collect::<Result<Vec<i64>>>()?;
@@ -208,30 +231,59 @@ impl Deck<'_> {
                 [first, last, step] if step > 0 && first <= last => (first, last, step),
                 _ => return Err(unexpected(place, "first, last and step of elements", text)),
             };
-            let mut number = first;
-            while number <= last && number - first < 1 << 31 {
-                self.put(number, feed);
-                let Some(next) = number.checked_add(step) else {
-                    break;
-                };
-                number = next;
-            }
+            let (numbers, n_others) = self.elements.among([first, last, step]);
+            numbers.for_each(|number| self.put(number, feed));
+            self.n_unknown = self.n_unknown.saturating_add(n_others);
             return Ok(());
         }
         for word in words {
-            match word.parse() {
-                Ok(number) => self.put(number, feed),
-                Err(_) => self.n_unknown += 1,
+            if let Ok(number) = word.parse() {
+                self.put(number, feed);
+                continue;
+            }
+            let Some(ranges) = self.ranges(word) else {
+                self.n_unknown += 1;
+                continue;
+            };
+            self.check_named(self.members.len(), &ranges, place)?;
+            for i in ranges.into_iter().flatten() {
+                let t = self.members.get(i);
+                self.put_tet(t);
             }
         }
         Ok(())
     }
 
+    /// Where the members of a set are that was read before.
+    fn ranges(&self, name: &str) -> Option<Vec<Range<usize>>> {
+        self.sets.get(&name.trim_matches('"').to_ascii_uppercase()).cloned()
+    }
+
+    /// Errors: so many members and these are more than a deck has.
+    fn check_named(&self, n: usize, more: &[Range<usize>], place: &FilePlace) -> Result<()> {
+        let n_all = more.iter().fold(n, |n, range| n + range.len());
+        let limit = NAMED_MAX * self.mesh.tets.len() + (1 << 16);
+        match n_all <= limit {
+            true => Ok(()),
+            false => Err(unsupported(place, format!("sets that name sets, of {n_all} elements"))),
+        }
+    }
+
     fn put<R: BufRead>(&mut self, number: i64, feed: &Feed<R>) {
-        let Ok(t) = self.elements.find(number, &self.mesh.space, feed) else {
-            self.n_unknown += 1;
+        match self.elements.find(number, &self.mesh.space, feed) {
+            Ok(t) => self.put_tet(t),
+            Err(_) => self.n_unknown += 1,
+        }
+    }
+
+    fn put_tet(&mut self, t: u32) {
+        self.members.push(t);
+        if let Some(range) = self.sets.get_mut(&self.set).and_then(|ranges| ranges.last_mut()) {
+            range.end += 1;
+        }
+        if !self.is_region {
             return;
-        };
+        }
         let mut tet = self.mesh.tets.get(t as usize);
         match self.of_elements.contains(&tet[4]) {
             true => tet[4] = self.group,
@@ -240,22 +292,34 @@ impl Deck<'_> {
         self.mesh.tets.set(t as usize, tet);
     }
 
-    /// A face of an element as `12, S3`.
-    fn surface<R: BufRead>(&mut self, text: &str, feed: &Feed<R>) -> Result<()> {
+    /// Faces of an element as `12, S3`, or of all elements of a set as `NAME, S3`.
+    fn surface<R: BufRead>(&mut self, text: &str, place: &FilePlace, feed: &Feed<R>) -> Result<()> {
+        self.elements.prepare(&self.mesh.space, feed)?;
         let mut words = text.split(',').map(str::trim);
         let (number, face) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
         let face = face.to_ascii_uppercase().strip_prefix('S').and_then(|k| k.parse().ok());
-        let face = face.filter(|k| (1..=4usize).contains(k));
-        let found = number
-            .parse()
-            .ok()
-            .and_then(|number| self.elements.find(number, &self.mesh.space, feed).ok());
-        let (Some(t), Some(face)) = (found, face) else {
+        let Some(face) = face.filter(|k| (1..=4usize).contains(k)) else {
             self.n_unknown += 1;
             return Ok(());
         };
-        let tet = self.mesh.tets.get(t as usize);
-        self.mesh.triangle(FACES[face - 1].map(|k| tet[k]), self.group);
+        let group = self.group;
+        let add = |mesh: &mut RawMesh, t: u32| {
+            let tet = mesh.tets.get(t as usize);
+            mesh.triangle(FACES[face - 1].map(|k| tet[k]), group);
+        };
+        if let Ok(number) = number.parse() {
+            match self.elements.find(number, &self.mesh.space, feed) {
+                Ok(t) => add(self.mesh, t),
+                Err(_) => self.n_unknown += 1,
+            }
+        } else if let Some(ranges) = self.ranges(number) {
+            self.check_named(self.mesh.triangles.len(), &ranges, place)?;
+            for i in ranges.into_iter().flatten() {
+                add(self.mesh, self.members.get(i));
+            }
+        } else {
+            self.n_unknown += 1;
+        }
         Ok(())
     }
 }

@@ -20,8 +20,8 @@ pub fn read<R: BufRead>(feed: Feed<R>, fields: MeshFields, mesh: &mut RawMesh) -
     let mut reader = GmshReader::open(feed, &mut none)?;
     reader.tets = Some(TetSink {
         mesh,
-        nodes: NodeNumbers::default(),
-        elements: NodeNumbers::default(),
+        nodes: NodeNumbers::of("node"),
+        elements: NodeNumbers::of("element"),
         takes: fields.values,
         has_parts,
         last: None,

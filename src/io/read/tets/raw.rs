@@ -230,9 +230,10 @@ impl RawMesh {
     }
 }
 
-/// From the numbers of nodes in a file to their positions.
-#[derive(Default)]
+/// From the numbers of nodes or elements in a file to their positions.
 pub(super) struct NodeNumbers {
+    /// What has the numbers: `node` or `element`.
+    noun: &'static str,
     first: i64,
     n: u32,
     /// All numbers, once they turn out not to count up by one.
@@ -242,6 +243,11 @@ pub(super) struct NodeNumbers {
 }
 
 impl NodeNumbers {
+    /// No numbers yet, of nodes or elements.
+    pub fn of(noun: &'static str) -> Self {
+        Self { noun, first: 0, n: 0, sparse: None, table: None }
+    }
+
     /// The next node of the file has this number.
     pub fn push(&mut self, number: i64, space: &ScratchSpace) {
         if self.n == 0 {
@@ -283,11 +289,27 @@ impl NodeNumbers {
                 let found = at.filter(|&i| i < table.len()).map(|i| table.get(i));
                 return match found {
                     Some(position) if position != u32::MAX => Ok(position),
-                    _ => Err(feed.out_of_range(number, *low, *low + table.len() as i64 - 1)),
+                    _ => Err(feed.out_of_range(number, *low, *low + (table.len() as i64 - 1))),
                 };
             }
         };
         feed.check_index(number, low, n)
+    }
+
+    /// Of the numbers from `first` to `last` by `step` above 0 those that are not below or above all known ones, and how many are. Call
+    /// [`NodeNumbers::prepare`] first.
+    pub fn among(&self, [first, last, step]: [i64; 3]) -> (impl Iterator<Item = i64> + use<>, u64) {
+        let [first, last, step] = [first, last, step].map(i128::from);
+        let (low, n) = match &self.table {
+            Some((low, table)) => (*low, table.len() as i128),
+            None => (self.first, i128::from(self.n)),
+        };
+        let (low, high) = (i128::from(low), i128::from(low) + n - 1);
+        let count = |from: i128, to: i128| if to < from { 0 } else { (to - from) / step + 1 };
+        let from = first + ((low - first).max(0) + step - 1) / step * step;
+        let (n_within, n_all) = (count(from, last.min(high)), count(first, last));
+        let numbers = (0..n_within).map(move |k| (from + k * step) as i64);
+        (numbers, u64::try_from(n_all - n_within).unwrap_or(u64::MAX))
     }
 
     fn build<R: BufRead>(&mut self, space: &ScratchSpace, feed: &Feed<R>) -> Result<()> {
@@ -298,15 +320,15 @@ impl NodeNumbers {
         }
         let span = high.abs_diff(low).saturating_add(1);
         if span > SPARSE_MAX * u64::from(self.n) + (1 << 20) {
-            let n = self.n;
-            return Err(feed.unsupported(format!("numbers from {low} to {high} of {n} nodes")));
+            let (n, noun) = (self.n, self.noun);
+            return Err(feed.unsupported(format!("numbers from {low} to {high} of {n} {noun}s")));
         }
         let mut table = space.vec(span as usize, u32::MAX);
         for i in 0..all.len() {
             let at = (all.get(i) - low) as usize;
             if table.get(at) != u32::MAX {
-                let expected = "nodes of different numbers".to_owned();
-                let found = format!("node {} a second time", all.get(i));
+                let expected = format!("{}s of different numbers", self.noun);
+                let found = format!("{} {} a second time", self.noun, all.get(i));
                 return Err(feed.refuse(ReadFault::Unexpected { expected, found }));
             }
             table.set(at, i as u32);

@@ -30,6 +30,12 @@ const VTU: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" b
     <DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4 8 11</DataArray>\n\
     <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">10 10 5</DataArray></Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
 
+/// Sets as Abaqus/CAE writes them: a set for each side of a surface, and sets of sets.
+const ABAQUS_SETS: &str = "*NODE\n1, 0, 0, 0\n2, 1.\n3, 0., 1.\n4, 0, 0, 1\n5, 0, 0, -1\n\
+    *ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n2, 1, 3, 2, 5\n*ELSET, ELSET=_wall_S2, INTERNAL\n1\n\
+    *ELSET, ELSET=Low\n1\n*ELSET, ELSET=region_1\nlow\n*ELSET, ELSET=region_2, GENERATE\n2, 2, 1\n\
+    *SURFACE, TYPE=ELEMENT, NAME=wall\n_WALL_S2, S2\n";
+
 fn read_with(files: &[(&str, &[u8])], fields: MeshFields) -> Result<RawMesh> {
     let dir = tempfile::tempdir().expect("a folder");
     for (name, bytes) in files {
@@ -94,6 +100,20 @@ fn one_mesh_is_the_same_in_every_format() {
     );
     let mut twice = read("a.inp", &twice).expect("it can be read");
     assert_eq!((twice.tets.len(), twice.tets.get(2)[0]), (3, 5));
+    // A range may be as wide as numbers are.
+    let wide = ABAQUS.replacen("2, 2, 1", "-9000000000000000000, 9000000000000000000, 2", 1);
+    let mut wide = read("a.inp", &wide).expect("it can be read");
+    assert_eq!(tets(&mut wide)[1].1, (1 << 40) + 2);
+    let mut sets = read(
+        "a.inp",
+        &ABAQUS_SETS.replacen("*ELSET, ELSET=Low\n", "*ELSET, ELSET=Low, INTERNAL\n", 1),
+    );
+    assert!(sets.as_ref().is_ok_and(|mesh| mesh.notes.is_empty()));
+    check(sets, (1 << 40, "wall"), [0; 2]);
+    // The first set that takes an element has it.
+    sets = read("a.inp", ABAQUS_SETS);
+    let notes = sets.map(|mesh| mesh.notes.join("; ")).unwrap_or_default();
+    assert!(notes.starts_with("1 member of a set or surface"), "{notes}");
     let named = read("a.inp", ABAQUS).expect("it can be read");
     assert!(named.regions.list.iter().any(|group| group.1 == "rock"));
     assert_eq!(read("a.mesh", MEDIT).expect("as above").notes, ["1 line or point was left out"]);
@@ -171,6 +191,14 @@ fn broken_files_are_refused_with_their_places() {
         (abaqus("*NODE", "*NODE, SYSTEM=C"), "unsupported-content", "line"),
         (abaqus("1, 1, 2, 3, 7", "1, 1, 2, 3"), "unsupported-content", "line 10"),
         (abaqus("7, 0, 0, 1D0", "7, 0, 0, one"), "not-a-number", "line 7"),
+        // Each line doubles a set.
+        (
+            abaqus("2, 2, 1", &format!("2, 2\n*ELSET, ELSET=all\nrock{}", "\nall".repeat(60))),
+            "unsupported-content",
+            "line",
+        ),
+        (abaqus("2, 1, 3,", "1, 1, 3,"), "unexpected-text", "line 15"),
+        (abaqus("2, 1, 3,", "9000000000000000, 1, 3,"), "unsupported-content", "line 15"),
         (abaqus("*HEADING", "*INCLUDE, INPUT=b.inp"), "unsupported-content", "line 1"),
         (vtu("0 2 1 4", "0 2 1 5"), "index-out-of-range", "byte"),
         (vtu("0 1 3</", "0 1</"), "truncated-file", "byte"),

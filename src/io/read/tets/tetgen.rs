@@ -10,7 +10,7 @@ use tetdb_base::geom::Point;
 
 pub fn read(path: &Path, limit: u64, mesh: &mut RawMesh) -> Result<()> {
     let beside = |ending| unpacked_name(path).with_extension(ending);
-    let mut nodes = NodeNumbers::default();
+    let mut nodes = NodeNumbers::of("node");
     read_nodes(open(&beside("node"), limit)?, &mut nodes, mesh)?;
     let mut feed = open(path, limit)?;
     let [n, n_nodes, n_attributes] = head(&mut feed, "tetrahedra")?;

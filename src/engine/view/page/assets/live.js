@@ -153,7 +153,7 @@ function live() {
     const sum = (test) => Object.entries(shown).filter(([name, s]) => test.test(name) && s.head).reduce(([a, b], [, s]) => [a + s.head.shown, b + s.head.of], [0, 0]);
     for (const [what, test] of [["the boundary", /^boundary/], ["the interfaces", /^low/], ["the section", /^section/]]) {
       const [some, all] = sum(test);
-      if (some < all && Object.entries(shown).some(([name, s]) => test.test(name) && s.head?.joined)) told.push(`${what} by ${count(some)} of ${count(all)} triangles`);
+      if (some < all && Object.entries(shown).some(([name, s]) => test.test(name) && s.head?.joined)) told.push(`${what} to ${count(some)} of ${count(all)} triangles`);
     }
     byId("shown").textContent = told.length ? `Thinned out for the eye: ${told.join(", ")}.` : "";
   }
