@@ -12,6 +12,9 @@ use tetdb_kernel::sizing::{TETS_PER_LOAD, load_of_tet};
 const NEAR: f64 = 0.005;
 /// Most steps of the search. Five to eight are usual.
 const STEPS_MAX: usize = 30;
+/// The search begins at most this far below the factor at which the first length gets shorter. The mean of a steep field is many powers of
+/// ten below it, and each step there takes all passes.
+const STEEP: f64 = 64.0;
 /// Passes over the edges in each direction. In the order of the mesh most lengths are settled after two.
 const PASSES_MAX: usize = 20;
 /// A load below that of one tetrahedron is none.
@@ -92,14 +95,14 @@ pub fn sizes_for(
     // Free of the skin the number goes with c⁻³.
     let mut slope = -3.0;
     let mut last: Option<[f64; 2]> = None;
-    sizes.c = sizes.first_factor().clamp(low, high);
+    sizes.c = sizes.first_factor().clamp(low.max(high / STEEP), high);
     let mut tets = sizes.tets();
-    let (mut is_flat, mut was_at_end) = (false, false);
+    let (mut is_flat, mut tried) = (false, [false; 2]);
     for _ in 0..STEPS_MAX {
         let [n, at] = [tets.iter().sum::<f64>() / n_tets, sizes.c].map(libm::log);
+        let side = usize::from(n > 0.0);
         // At the end limits and skin allow no more, or no less.
-        let end = ends[usize::from(n > 0.0)];
-        if n.abs() < NEAR || sizes.c == end {
+        if n.abs() < NEAR || sizes.c == ends[side] {
             break;
         }
         match n > 0.0 {
@@ -110,14 +113,20 @@ pub fn sizes_for(
             slope = ((n - n_before) / (at - at_before)).clamp(-3.0, -0.1);
         }
         last = Some([n, at]);
-        let next = libm::exp(at - n / slope);
         // Where a field is steep, all lengths may be at a limit for many factors, though not for all.
-        sizes.c = match low < next && next < high {
-            _ if is_flat && !was_at_end => end,
-            true if !is_flat => next,
-            _ => (low * high).sqrt(),
+        let next = match (is_flat, n > 0.0) {
+            (false, _) => libm::exp(at - n / slope),
+            (true, false) => sizes.c / 4.0,
+            (true, true) => high,
         };
-        was_at_end |= sizes.c == end;
+        sizes.c = if low < next && next < high {
+            next
+        } else if [low, high][side] == ends[side] && !tried[side] {
+            tried[side] = true;
+            ends[side]
+        } else {
+            (low * high).sqrt()
+        };
         let before = tets;
         tets = sizes.tets();
         is_flat = tets == before;
@@ -158,8 +167,8 @@ impl<'a> NodeSizes<'a> {
         sizes
     }
 
-    /// The least and the greatest factor of interest: above the greatest no length gets longer, below the least none gets shorter or some are
-    /// a millionth of what they may be.
+    /// The least and the greatest factor of interest: above the greatest no length gets longer, below the least none gets shorter. Without
+    /// limits the least is a millionth of the greatest, where the number is beyond any.
     fn factors(&mut self) -> [f64; 2] {
         let (mut least, mut most) = (f64::INFINITY, 0.0f64);
         for v in 0..self.mesh.n_nodes() {
@@ -171,9 +180,10 @@ impl<'a> NodeSizes<'a> {
                 most = most.max(if high.is_finite() { high } else { 0.0 });
             }
         }
-        match most.is_normal() {
-            true => [least.clamp(1e-6 * most, most), most],
-            false => [1.0; 2],
+        match (most.is_normal(), least > 0.0) {
+            (false, _) => [1.0; 2],
+            (true, true) => [least.min(most), most],
+            (true, false) => [1e-6 * most, most],
         }
     }
 
