@@ -6,7 +6,7 @@ use tetdb_schema::page::NONE;
 
 use super::brick::{Brick, Bricks, SLOT_BITS, SLOT_MASK, Slot};
 use super::field::Field;
-use super::flat::Vertex;
+use super::flat::{RIM, Vertex};
 use super::part::Part;
 use super::partition::KdPartition;
 use crate::mesh::anatomy::mark::EXAMINED;
@@ -34,9 +34,6 @@ fn next_slot(counts: &mut [u32], brick: u32) -> Slot {
     *count += 1;
     Slot { brick, slot }
 }
-
-/// Flag in bricks of a tetrahedron at the rim of a part. Its region is its dense id in the mesh.
-pub(super) const RIM: u32 = 1 << 31;
 
 /// Fills empty bricks with a mesh, or with a part of it. Coarse vertices keep their id in their note. What lies beyond the field's place
 /// counts as examined. Effects: the scratch map is used up.
@@ -78,8 +75,21 @@ pub(super) fn to_bricks<P: Pages>(
             mesh.set_scratch(n_vertices + k, packed(to));
         }
     }
+    fill(mesh, field, part, all(), bricks);
+    mesh.clear_scratch();
+}
+
+/// Puts tetrahedra into their bricks, in the order of their slots, which the scratch map has behind those of the vertices.
+fn fill<P: Pages>(
+    mesh: &mut Mesh<P>,
+    field: &Field,
+    part: Option<&Part>,
+    members: Members,
+    bricks: &Bricks,
+) {
+    let n_vertices = dense(mesh.vertex_ids_end());
     let mut unmatched = 0;
-    for (k, at_rim) in all() {
+    for (k, at_rim) in members {
         let mut tet = mesh.tet(sparse(k));
         if !tet.is_live() {
             continue;
@@ -118,7 +128,6 @@ pub(super) fn to_bricks<P: Pages>(
             brick.attributes.push(attribute);
         });
     }
-    mesh.clear_scratch();
     // Pages that were changed together with their checksums: the caller then looks for the place.
     assert_eq!(unmatched, 0, "neighbors of different faces");
 }

@@ -57,6 +57,9 @@ pub(super) const EMPTY: Tet = Tet { node: [NONE; 4], neighbor: [FaceRef::NONE; 4
 /// Region and flags of a tetrahedron, as [`Mesh::tet_attribute`](crate::mesh::Mesh::tet_attribute) tells them.
 pub(super) type Attribute = (u32, u32);
 
+/// Flag of a tetrahedron at the rim of a part of a mesh, which is held. Its region is its dense id in the mesh.
+pub(super) const RIM: u32 = 1 << 31;
+
 /// Vertices and tetrahedra of a block and its margin.
 ///
 /// A tetrahedron with a neighbor outside the arrays is *held*: nothing may replace it, because that one refers to it. It has no neighbor

@@ -9,8 +9,7 @@ use std::sync::Arc;
 use tetdb_schema::page::NONE;
 
 use super::brick::{Brick, SLOT_BITS, SLOT_MASK, Slot};
-use super::convert::RIM;
-use super::flat::{EMPTY, FlatMesh, Vertex};
+use super::flat::{EMPTY, FlatMesh, RIM, Vertex};
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
 use crate::mesh::{FaceRef, Tet};
