@@ -18,6 +18,7 @@ and compares the pieces of many writers. `carriers` kills ranks of MPI, tasks an
 --seed chooses the times. Exit code 0 when everything was as it has to be.
 """
 import argparse
+import functools
 import hashlib
 import json
 import os
@@ -40,17 +41,21 @@ STEPS = ["rename", "link", "linkat", "unlink", "unlinkat", "mkdir", "rmdir", "fs
 LOCKS = {"as they are": [], "refused": ["error=ENOLCK"], "given to all": ["retval=0"]}
 
 
+def called(args, *words):
+    """What the program prints; ends the script where it fails."""
+    done = subprocess.run([args.tetdb, *words], capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"WRONG: {' '.join(words)}: exit {done.returncode}\n{done.stderr}")
+    return done.stdout
+
+
 def mesh(args):
     """The change is made once, timed and undone. Then it is begun again and again, and killed at a time drawn evenly from that of a whole run
     and a twentieth more. After each kill the digests of all sub-domains and interfaces must be those of before or those of after. Every
     fifth time an old mesh is changed without a kill; each new one is undone. Prints a line of JSON for each kill and a summary."""
     change = ["resaturate", args.store, "--subdomain", args.subdomain, "--refine-by", args.refine_by, "--no-verify"]
 
-    def run(*words):
-        done = subprocess.run([args.tetdb, *words], capture_output=True, text=True)
-        if done.returncode:
-            sys.exit(f"{' '.join(words)}: exit {done.returncode}\n{done.stderr}")
-        return done.stdout
+    run = functools.partial(called, args)
 
     def state():
         info = json.loads(run("info", args.store, "--json"))
@@ -104,11 +109,7 @@ def changes(args):
     store, first = os.path.join(folder, "store.tetdb"), os.path.join(folder, "first.tetdb")
     os.makedirs(folder)
 
-    def call(*words):
-        done = subprocess.run([args.tetdb, *words], capture_output=True, text=True)
-        if done.returncode:
-            sys.exit(f"WRONG: {' '.join(words)}: exit {done.returncode}\n{done.stderr}")
-        return done.stdout
+    call = functools.partial(called, args)
 
     def state():
         info = json.loads(call("info", store, "--json"))

@@ -109,11 +109,11 @@ pub fn saturate<P: Pages>(
     report
 }
 
-/// What to saturate, and how.
+/// Settings of one saturation.
 #[derive(Clone, Copy)]
 struct How {
     mode: Mode,
-    /// Whether nothing is to be left that could be divided.
+    /// Whether what no block could divide is tried again in wider regions.
     is_final: bool,
     /// Rings of tetrahedra around a part; `None` for the whole mesh.
     rings: Option<u32>,

@@ -1,6 +1,6 @@
-//! The part of a mesh that a saturation changes, where points go to a part of space alone.
+//! The part of a mesh that one saturation changes, when points may be added in a part of space only.
 //!
-//! What lies farther off stays in its pages. The part is closed off by a rim of tetrahedra, copied into bricks and held there.
+//! All other tetrahedra stay in their pages. Those that touch the part are its rim: bricks have copies of them, which never change.
 
 use tetdb_schema::page::NONE;
 
@@ -21,7 +21,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// What the field's place reaches, and so many rings of neighbors around it.
+    /// The tetrahedra that the field's place reaches, with that many rings of neighbors around them.
     ///
     /// Effects: the scratch map is used up.
     pub fn around<P: Pages>(mesh: &mut Mesh<P>, field: &Field, rings: u32) -> Self {

@@ -14,7 +14,7 @@ pub trait PlacementRule: Sync {
         true
     }
 
-    /// Whether it is worth to look farther and farther for what a tetrahedron takes that no block could divide.
+    /// Whether a tetrahedron that no block could divide is tried again in wider regions.
     fn needs(&self, _points: &[Point; 4], _sizes: &[f32; 4]) -> bool {
         true
     }

@@ -75,7 +75,7 @@ struct Wanted<'a> {
     had: &'a SizeField,
     /// The field of the whole surface without and with the new options.
     fields: Option<[&'a SizeField; 2]>,
-    /// Whether the lengths on record are those of an imported mesh, and not of its surface alone.
+    /// True if the recorded lengths were measured in an imported mesh, so that they are not those of its surface alone.
     is_of_file: bool,
     /// Factor for all lengths.
     factor: f64,

@@ -232,7 +232,7 @@ impl RawMesh {
 
 /// From the numbers of nodes or elements in a file to their positions.
 pub(super) struct NodeNumbers {
-    /// What has the numbers: `node` or `element`.
+    /// The word for errors: `node` or `element`.
     noun: &'static str,
     first: i64,
     n: u32,
@@ -296,8 +296,8 @@ impl NodeNumbers {
         feed.check_index(number, low, n)
     }
 
-    /// Of the numbers from `first` to `last` by `step` above 0 those that are not below or above all known ones, and how many are. Call
-    /// [`NodeNumbers::prepare`] first.
+    /// The numbers from `first` to `last` by `step`, which is above 0, as far as they lie between the least and the greatest known one; and how
+    /// many lie outside. Call [`NodeNumbers::prepare`] first.
     pub fn among(&self, [first, last, step]: [i64; 3]) -> (impl Iterator<Item = i64> + use<>, u64) {
         let [first, last, step] = [first, last, step].map(i128::from);
         let (low, n) = match &self.table {

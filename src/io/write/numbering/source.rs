@@ -23,7 +23,7 @@ pub(in crate::write) struct Source {
 }
 
 impl Source {
-    /// What `scope` writes of a sub-domain: its tetrahedra of these regions, and the vertices that these have.
+    /// The tetrahedra of a sub-domain that `scope` writes, and their vertices.
     fn gather(
         store: &mut Catalog,
         row: SubdomainRow,
