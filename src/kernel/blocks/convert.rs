@@ -6,7 +6,7 @@ use tetdb_schema::page::NONE;
 
 use super::brick::{Brick, Bricks, SLOT_BITS, SLOT_MASK, Slot};
 use super::field::Field;
-use super::flat::{RIM, Vertex};
+use super::flat::{Attribute, RIM, Vertex};
 use super::part::Part;
 use super::partition::KdPartition;
 use crate::mesh::anatomy::mark::EXAMINED;
@@ -47,89 +47,187 @@ pub(super) fn to_bricks<P: Pages>(
     let n_vertices = dense(mesh.vertex_ids_end());
     let n_tets = dense(mesh.tet_ids_end());
     mesh.reset_scratch(n_vertices + n_tets, NONE);
-    let all = || Members::new(part, n_tets);
     // Ids given back have no tetrahedron.
-    for (k, _) in all() {
+    for (k, _) in Members::new(part, n_tets) {
         let tet = mesh.tet(sparse(k));
         if tet.is_live() {
             tet.vertices().into_iter().for_each(|v| mesh.set_scratch(dense(v), 0));
         }
     }
     let mut counts = vec![0u32; partition.n_bricks()];
-    for v in mesh.vertex_ids() {
-        if mesh.scratch(dense(v)) == NONE {
-            continue;
+    let ranges: Vec<u32> = (0..n_vertices).step_by(AT_ONCE).collect();
+    for ranges in ranges.chunks(BATCH) {
+        for mut found in scan_parts(mesh, ranges, &Placed { partition, end: n_vertices }) {
+            for (brick, vertex) in &found {
+                let to = next_slot(&mut counts, *brick);
+                mesh.set_scratch(dense(vertex.note), packed(to));
+            }
+            found.sort_by_key(|&(brick, _)| brick);
+            for some in found.chunk_by(|a, b| a.0 == b.0) {
+                let vertices = some.iter().map(|&(_, vertex)| vertex);
+                bricks.change(some[0].0, |brick| brick.vertices.extend(vertices));
+            }
         }
-        let (point, h) = mesh.point_and_size(v);
-        let to = next_slot(&mut counts, partition.find(point));
-        mesh.set_scratch(dense(v), packed(to));
-        let vertex = Vertex::new(point, h, mesh.is_fixed(v), v);
-        bricks.change(to.brick, |brick| brick.vertices.push(vertex));
     }
     counts.fill(0);
-    for (k, _) in all() {
-        let tet = mesh.tet(sparse(k));
-        if tet.is_live() {
-            let [a, b, c, d] = tet.vertices().map(|v| unpacked(mesh.scratch(dense(v))).brick);
-            let to = next_slot(&mut counts, a.min(b).min(c.min(d)));
-            mesh.set_scratch(n_vertices + k, packed(to));
+    let mut members = Members::new(part, n_tets).peekable();
+    while members.peek().is_some() {
+        for found in scan_parts(mesh, &some_of(&mut members), &Homes) {
+            for (k, brick) in found {
+                mesh.set_scratch(n_vertices + k, packed(next_slot(&mut counts, brick)));
+            }
         }
     }
-    fill(mesh, field, part, all(), bricks);
+    fill(mesh, field, part, bricks);
     mesh.clear_scratch();
 }
 
+/// Vertices, or tetrahedra, that one thread converts at once, and such parts taken together: some megabytes.
+const AT_ONCE: usize = 2_048;
+const BATCH: usize = 16;
+
+/// Parts of the next members.
+fn some_of(members: &mut impl Iterator<Item = (u32, bool)>) -> Vec<Vec<(u32, bool)>> {
+    let parts = (0..BATCH).map(|_| members.by_ref().take(AT_ONCE).collect::<Vec<_>>());
+    parts.filter(|part| !part.is_empty()).collect()
+}
+
+/// Scan that returns the vertices marked in the scratch map, from a dense id on, and their bricks.
+struct Placed<'a> {
+    partition: &'a KdPartition,
+    end: u32,
+}
+
+impl Scan for Placed<'_> {
+    type Part = u32;
+    type Output = Vec<(u32, Vertex)>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &from: &u32) -> Self::Output {
+        let mut found = Vec::new();
+        for k in (from..self.end).take(AT_ONCE) {
+            if mesh.scratch(k) == NONE {
+                continue;
+            }
+            let v = sparse(k);
+            let (point, h) = mesh.point_and_size(v);
+            let vertex = Vertex::new(point, h, mesh.is_fixed(v), v);
+            found.push((self.partition.find(point), vertex));
+        }
+        found
+    }
+}
+
+/// Scan that returns the bricks of tetrahedra; those not in use are left out.
+struct Homes;
+
+impl Scan for Homes {
+    type Part = Vec<(u32, bool)>;
+    type Output = Vec<(u32, u32)>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Self::Part) -> Self::Output {
+        let mut found = Vec::with_capacity(part.len());
+        for &(k, _) in part {
+            let tet = mesh.tet(sparse(k));
+            if tet.is_live() {
+                let [a, b, c, d] = tet.vertices().map(|v| unpacked(mesh.scratch(dense(v))).brick);
+                found.push((k, a.min(b).min(c.min(d))));
+            }
+        }
+        found
+    }
+}
+
 /// Puts tetrahedra into their bricks, in the order of their slots, which the scratch map has behind those of the vertices.
-fn fill<P: Pages>(
-    mesh: &mut Mesh<P>,
-    field: &Field,
-    part: Option<&Part>,
-    members: Members,
-    bricks: &Bricks,
-) {
+fn fill<P: Pages>(mesh: &mut Mesh<P>, field: &Field, part: Option<&Part>, bricks: &Bricks) {
     let n_vertices = dense(mesh.vertex_ids_end());
     let mut unmatched = 0;
-    for (k, at_rim) in members {
-        let mut tet = mesh.tet(sparse(k));
-        if !tet.is_live() {
-            continue;
-        }
-        if at_rim && let Some(part) = part {
-            let leads_in = |face: FaceRef| part.inside.binary_search(&dense(face.tet())).is_ok();
-            for face in tet.neighbor.iter_mut().filter(|face| face.exists() && !leads_in(**face)) {
-                *face = FaceRef::NONE;
+    let mut members = Members::new(part, dense(mesh.tet_ids_end())).peekable();
+    while members.peek().is_some() {
+        let found = scan_parts(mesh, &some_of(&mut members), &Slots { field, part, n_vertices });
+        for (placed, code) in found {
+            unmatched ^= code;
+            for some in placed.chunk_by(|a, b| a.home.brick == b.home.brick) {
+                bricks.change(some[0].home.brick, |brick| some.iter().for_each(|p| p.put(brick)));
             }
         }
-        for face in (0..4).map(|i| FaceRef::new(sparse(k), i)) {
-            unmatched ^= pair_code(&tet, face);
-        }
-        let vertices = tet.vertices().map(|v| unpacked(mesh.scratch(dense(v))));
-        let across = tet.neighbor.map(|face| {
-            face.exists().then(|| unpacked(mesh.scratch(n_vertices + dense(face.tet()))))
-        });
-        let home = unpacked(mesh.scratch(n_vertices + k));
-        let attribute = if at_rim { (k, RIM) } else { mesh.tet_attribute(sparse(k)) };
-        let is_due = !at_rim && (part.is_none() || field.reaches(&mesh.ends(&tet)));
-        bricks.change(home.brick, |brick| {
-            for (node, to) in tet.node.iter_mut().zip(vertices) {
-                *node = *node & !(VERTEX_MASK | MARK) | brick.refer(to);
-            }
-            for (face, to) in tet.neighbor.iter_mut().zip(across) {
-                if let Some(to) = to {
-                    *face = FaceRef::new(brick.refer(to), face.face());
-                }
-            }
-            debug_assert_eq!(brick.tets.len(), home.slot as usize);
-            if !is_due {
-                tet.node[EXAMINED] |= MARK;
-            }
-            brick.unexamined += u32::from(is_due);
-            brick.tets.push(tet);
-            brick.attributes.push(attribute);
-        });
     }
     // Pages that were changed together with their checksums: the caller then looks for the place.
     assert_eq!(unmatched, 0, "neighbors of different faces");
+}
+
+/// A tetrahedron on its way into a brick.
+struct PlacedTet {
+    tet: Tet,
+    attribute: Attribute,
+    home: Slot,
+    vertices: [Slot; 4],
+    across: [Option<Slot>; 4],
+    is_due: bool,
+}
+
+impl PlacedTet {
+    fn put(&self, brick: &mut Brick) {
+        let mut tet = self.tet;
+        for (node, &to) in tet.node.iter_mut().zip(&self.vertices) {
+            *node = *node & !(VERTEX_MASK | MARK) | brick.refer(to);
+        }
+        for (face, to) in tet.neighbor.iter_mut().zip(self.across) {
+            if let Some(to) = to {
+                *face = FaceRef::new(brick.refer(to), face.face());
+            }
+        }
+        debug_assert_eq!(brick.tets.len(), self.home.slot as usize);
+        if !self.is_due {
+            tet.node[EXAMINED] |= MARK;
+        }
+        brick.unexamined += u32::from(self.is_due);
+        brick.tets.push(tet);
+        brick.attributes.push(self.attribute);
+    }
+}
+
+/// Scan that returns tetrahedra by their bricks, and a sum over their faces.
+struct Slots<'a, 'b> {
+    field: &'a Field<'b>,
+    part: Option<&'a Part>,
+    n_vertices: u32,
+}
+
+impl Scan for Slots<'_, '_> {
+    type Part = Vec<(u32, bool)>;
+    type Output = (Vec<PlacedTet>, u64);
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, members: &Self::Part) -> Self::Output {
+        let (mut found, mut unmatched) = (Vec::with_capacity(members.len()), 0);
+        for &(k, at_rim) in members {
+            let mut tet = mesh.tet(sparse(k));
+            if !tet.is_live() {
+                continue;
+            }
+            if at_rim && let Some(Part { inside, .. }) = self.part {
+                let leads_in = |face: FaceRef| inside.binary_search(&dense(face.tet())).is_ok();
+                for face in
+                    tet.neighbor.iter_mut().filter(|face| face.exists() && !leads_in(**face))
+                {
+                    *face = FaceRef::NONE;
+                }
+            }
+            for face in (0..4).map(|i| FaceRef::new(sparse(k), i)) {
+                unmatched ^= pair_code(&tet, face);
+            }
+            let mut slot = |at: u32| unpacked(mesh.scratch(at));
+            let vertices = tet.vertices().map(|v| slot(dense(v)));
+            let slot_across =
+                |face: FaceRef| face.exists().then(|| slot(self.n_vertices + dense(face.tet())));
+            let across = tet.neighbor.map(slot_across);
+            let home = unpacked(mesh.scratch(self.n_vertices + k));
+            let attribute = if at_rim { (k, RIM) } else { mesh.tet_attribute(sparse(k)) };
+            let is_due = !at_rim && (self.part.is_none() || self.field.reaches(&mesh.ends(&tet)));
+            found.push(PlacedTet { tet, attribute, home, vertices, across, is_due });
+        }
+        found.sort_unstable_by_key(|placed| (placed.home.brick, placed.home.slot));
+        (found, unmatched)
+    }
 }
 
 /// Dense ids of the tetrahedra that become bricks, ascending, and whether each is at the rim.
@@ -246,7 +344,7 @@ pub(super) fn to_pages<P: Pages>(
     let (mut k, mut first) = (0, 0);
     while first < n_bricks {
         let batch: Vec<_> =
-            (first..n_bricks).take(BATCH).map(|number| bricks.take(number)).collect();
+            (first..n_bricks).take(BRICKS).map(|number| bricks.take(number)).collect();
         first += batch.len() as u32;
         let parts: Vec<u32> = (0..batch.len() as u32).collect();
         let scan = Renumbered { batch: &batch, numbers: &numbers, ids: &ids };
@@ -278,7 +376,7 @@ pub(super) fn to_pages<P: Pages>(
 }
 
 /// Bricks renumbered at once: some megabytes.
-const BATCH: usize = 128;
+const BRICKS: usize = 128;
 
 /// Scan that returns the tetrahedra of a brick under their ids, and how many have several required faces.
 struct Renumbered<'a> {
