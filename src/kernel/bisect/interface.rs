@@ -15,7 +15,7 @@ use super::side_labels::{InterfaceMeasures, SideLabels, face_cost, measure};
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
 use tetdb_base::geom::Point;
-use tetdb_base::storage::{Pages, check_cancelled, for_each_mut};
+use tetdb_base::storage::{Pages, check_cancelled, for_each_mut, spare_threads};
 use tetdb_schema::page::NONE;
 
 /// Nodes of a graph that is cut at once; wider interfaces are cut strip by strip. Of 593,000 tetrahedra, strips of 400,000 choose 46,024 faces in
@@ -75,8 +75,15 @@ pub(super) fn choose<P: Pages>(
     (report, moves.labels)
 }
 
-/// Strips that are cut at once, each with a graph of its own.
+/// Strips that are cut at once, each with a graph of its own of so many bytes, as memory allows.
 const AT_ONCE: usize = 2;
+const GRAPH_BYTES: u64 = 8 << 20;
+
+/// How many strips are cut at once; the result does not depend on it.
+fn strips_at_once<P: Pages>(core: &Mesh<P>) -> usize {
+    let room = core.pages().bytes_used().map_or(u64::MAX, |[used, most]| most.saturating_sub(used));
+    spare_threads().min((room / 4 / GRAPH_BYTES) as usize).max(AT_ONCE)
+}
 
 /// Cuts strip by strip; returns the most bytes held.
 fn minimum_cut<P: Pages>(
@@ -103,9 +110,10 @@ fn minimum_cut<P: Pages>(
     for border in (length..free.len()).step_by(length) {
         kinds[2].push(&order[border - half..free.len().min(border + half)]);
     }
+    let at_once = strips_at_once(core);
     let mut cuts: Vec<(Vec<u32>, Graph)> = Vec::new();
-    cuts.resize_with(strips.min(AT_ONCE), Default::default);
-    for strips in kinds.iter().flat_map(|kind| kind.chunks(AT_ONCE)) {
+    cuts.resize_with(strips.min(at_once), Default::default);
+    for strips in kinds.iter().flat_map(|kind| kind.chunks(at_once)) {
         for (&strip, (tets, graph)) in strips.iter().zip(&mut cuts) {
             check_cancelled();
             // In id order, which follows the curve: neighbors in space are near in the graph's memory. The least cut
