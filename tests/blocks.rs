@@ -8,15 +8,17 @@
 
 use std::collections::BTreeMap;
 
-use tetdb_base::geom::{Point, orient};
+use tetdb_base::geom::{HilbertFrame, Point, orient};
 use tetdb_base::storage::{Budget, CancelToken, DiskPath, FlatPages, RunContext, ScratchSpace};
 use tetdb_base::surface::Surface;
 use tetdb_engine::pipeline::{
     self, MeshOptions, Options, OptionsText, Plan, RunOptions, Subdomains, Summary, Trial, silent,
 };
-use tetdb_kernel::blocks::{Field, PlacementRule, saturate};
+use tetdb_kernel::blocks::{
+    Everywhere, Field, FinishedTet, FinishedVertex, PlacementRule, saturate, saturate_to_seal,
+};
 use tetdb_kernel::mesh::{FaceRef, Mesh, Tet};
-use tetdb_kernel::optimize::Mode;
+use tetdb_kernel::optimize::{Mode, mend};
 use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::Job;
 use tetdb_store::audit::{self, Level, Report, VerifyOptions};
@@ -159,15 +161,7 @@ fn sound(mesh: &mut Mesh<FlatPages>) -> (BTreeMap<u32, Tet>, f64) {
 #[test]
 fn what_lies_far_from_a_part_stays_as_it_is() {
     let h = 0.03;
-    let surface: Surface =
-        SampleSpec::parse("box,x=5,h=0.1").and_then(|spec| spec.make()).expect("a box").into();
-    let mut mesh = Mesh::new(FlatPages::default());
-    let room = ScratchSpace::boundless();
-    pipeline::coarse_mesh(&mut mesh, &surface, &Options::default(), &room, &silent)
-        .expect("a box meshes");
-    for v in mesh.vertex_ids() {
-        mesh.set_size(v, h as f32);
-    }
+    let (mut mesh, surface) = coarse("box,x=5,h=0.1", h);
     let (before, volume) = sound(&mut mesh);
     let bounds = surface.bounds();
     // Wall to wall at one end, and a ball that touches no wall.
@@ -201,4 +195,69 @@ fn what_lies_far_from_a_part_stays_as_it_is() {
     assert!(far.len() > 100, "{} tetrahedra at the far end", far.len());
     let changed = far.iter().filter(|&t| before[t] != after[t]).count();
     assert_eq!(changed, 0, "of {}", far.len());
+}
+
+fn coarse(words: &str, h: f64) -> (Mesh<FlatPages>, Surface) {
+    let spec = SampleSpec::parse(words).and_then(|spec| spec.make());
+    let surface: Surface = spec.expect("a sample").into();
+    let mut mesh = Mesh::new(FlatPages::default());
+    let room = ScratchSpace::boundless();
+    pipeline::coarse_mesh(&mut mesh, &surface, &Options::default(), &room, &silent)
+        .expect("a sample meshes");
+    for v in mesh.vertex_ids() {
+        mesh.set_size(v, h as f32);
+    }
+    (mesh, surface)
+}
+
+/// A tetrahedron whatever its numbers: its corners in order, and the required faces by the corner across.
+fn by_places(points: [Point; 4], required: u8) -> [([u64; 3], bool); 4] {
+    let corner = |i: usize| (points[i].to_array().map(f64::to_bits), required >> i & 1 != 0);
+    let mut corners = [0, 1, 2, 3].map(corner);
+    corners.sort_unstable();
+    corners
+}
+
+/// What is sealed from bricks is what pages would hold, in the order of a sealed file; where something is to be mended there are pages.
+#[test]
+fn a_mesh_in_bricks_is_that_in_pages() {
+    for (words, h) in [("knot,h=0.06", 0.06), ("balls,count=20", 0.08)] {
+        let (mut in_pages, surface) = coarse(words, h);
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let dir = DiskPath::from(dir.path());
+        let field = Field { h: &|_| h, place: &Everywhere, bounds: surface.bounds() };
+        saturate(&mut in_pages, &field, Mode::Full, &dir, &mut |_| ());
+        mend(&mut in_pages, &|_| ());
+        let (tets, _) = sound(&mut in_pages);
+        let place = |tet: &Tet| by_places(in_pages.points(tet), tet.required_faces());
+        let mut expected: Vec<_> = tets.values().map(place).collect();
+        expected.sort_unstable();
+
+        let (mut rest, _) = coarse(words, h);
+        let (_, finished) = saturate_to_seal(&mut rest, &field, Mode::Full, &dir, &mut |_| ());
+        let finished = finished.expect("nothing is to be mended");
+        assert_eq!((rest.n_tets(), finished.n_tets()), (0, tets.len() as u64));
+        let mut points = Vec::new();
+        let mut add = |some: &[_]| {
+            points.extend(some.iter().map(|v: &FinishedVertex| v.point));
+            Ok::<_, ()>(())
+        };
+        let frame = HilbertFrame::new(&surface.bounds());
+        finished.number(&mut rest, &frame, 1_000, &mut add).expect("nothing fails");
+        let sealed: Vec<_> = finished.tets().collect();
+        assert!(sealed.is_sorted_by_key(|found| found.tet.nodes));
+        assert!(sealed.iter().all(|found| found.tet == found.tet.rotated()));
+        let place = |found: &FinishedTet| {
+            by_places(found.tet.nodes.map(|v| points[v as usize]), found.required)
+        };
+        let mut found: Vec<_> = sealed.iter().map(place).collect();
+        found.sort_unstable();
+        assert!(found == expected, "{words}");
+    }
+    let (mut needles, surface) = coarse("needles,count=300", 0.3);
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = DiskPath::from(dir.path());
+    let field = Field { h: &|_| 0.3, place: &Everywhere, bounds: surface.bounds() };
+    let (_, finished) = saturate_to_seal(&mut needles, &field, Mode::Full, &dir, &mut |_| ());
+    assert!(finished.is_none() && sound(&mut needles).0.len() > 100);
 }

@@ -146,6 +146,12 @@ impl<T: Shelved> Shelf<T> {
         self.keep_limit();
     }
 
+    /// Lowers the limit by so many bytes, but by half of it at most.
+    pub fn make_room(&self, bytes: usize) {
+        let limit = self.lock().limit;
+        self.limit(limit.saturating_sub(bytes).max(limit / 2));
+    }
+
     /// The object of a number, which is read without keeping others waiting.
     fn load(&self, number: u32, buffer: &mut Vec<u8>) -> Arc<T> {
         loop {

@@ -1,7 +1,7 @@
 //! Columns as Apache Parquet: for each sub-domain a file of tetrahedra and one of vertices.
 //!
 //! `NAME_00007.parquet` has a row for each tetrahedron, `NAME_00007_vertices.parquet` one for each vertex; `NAME.parquet` is not written. Rows are
-//! in the order of the store, along a Hilbert curve. A field has a column for each component, such as `u.x`. Each group of rows has the least and greatest value of each column, so that programs read
+//! in the order of the store, near in space what is near in the file. A field has a column for each component, such as `u.x`. Each group of rows has the least and greatest value of each column, so that programs read
 //! only the groups of a box of space.
 
 use std::collections::BTreeSet;

@@ -24,6 +24,8 @@ pub(super) struct Brick {
     pub vertices: Vec<Vertex>,
     /// Tetrahedra that division has not examined yet.
     pub unexamined: u32,
+    /// Whether something in it may be left to mend.
+    pub to_mend: bool,
 }
 
 /// All bricks. Those that a task does not change are shared with it.
@@ -44,7 +46,8 @@ impl Shelved for Brick {
         let counts = [self.near.len(), self.tets.len(), self.vertices.len(), n_attributes];
         let [near, tets, vertices, attributes] = counts.map(|n| n as u32);
         // A length and an order in which all records lie aligned in an aligned buffer.
-        let head: Head = [near, tets, vertices, attributes, self.unexamined, 0];
+        let head: Head =
+            [near, tets, vertices, attributes, self.unexamined, u32::from(self.to_mend)];
         out.extend_from_slice(bytemuck::cast_slice(&head));
         out.extend_from_slice(bytemuck::cast_slice(&self.vertices));
         out.extend_from_slice(bytemuck::cast_slice(&self.tets));
@@ -57,7 +60,7 @@ impl Shelved for Brick {
     fn read(bytes: &[u8]) -> Self {
         let mut rest = bytes;
         let head = records::<Head>(&mut rest, 1)[0];
-        let [n_near, n_tets, n_vertices, n_attributes, unexamined, _] = head;
+        let [n_near, n_tets, n_vertices, n_attributes, unexamined, to_mend] = head;
         let vertices = records(&mut rest, n_vertices);
         let tets = records(&mut rest, n_tets);
         let near = records(&mut rest, n_near);
@@ -66,11 +69,11 @@ impl Shelved for Brick {
         if let [common] = attributes[..] {
             attributes.resize(n_tets as usize, common);
         }
-        Self { near, tets, attributes, vertices, unexamined }
+        Self { near, tets, attributes, vertices, unexamined, to_mend: to_mend != 0 }
     }
 }
 
-/// Counts of references, tetrahedra, vertices and attributes; tetrahedra not examined; nothing.
+/// Counts of references, tetrahedra, vertices and attributes; tetrahedra not examined; whether something is to be mended.
 type Head = [u32; 6];
 
 /// Takes `n` records from the front of what was written.
@@ -98,6 +101,13 @@ impl Brick {
     pub fn resolve(&self, reference: u32) -> Slot {
         let brick = self.near[(reference >> SLOT_BITS) as usize];
         Slot { brick, slot: reference & SLOT_MASK }
+    }
+
+    /// The brick of the first of a tetrahedron's vertices, by bricks.
+    #[inline(always)]
+    pub fn home(&self, tet: &Tet) -> u32 {
+        let [a, b, c, d] = tet.vertices().map(|v| self.near[(v >> SLOT_BITS) as usize]);
+        a.min(b).min(c.min(d))
     }
 
     /// Where the neighbor across a face is, if there is one.

@@ -12,7 +12,7 @@ use super::spawn::is_in;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, REQUIRED};
 use crate::mesh::{FaceRef, Mesh, Tet, dense, sparse};
-use crate::optimize::{OperationCounts, improve_all_but};
+use crate::optimize::{OperationCounts, improve_all_but, is_to_mend};
 use tetdb_base::geom::Point;
 use tetdb_base::shape::{INVERSE_QUALITY_WANTED, is_below};
 use tetdb_base::storage::{FlatPages, Pages, kind};
@@ -41,7 +41,7 @@ pub(super) fn improve(
     let common = common_attribute(&region.mesh);
     let (pages, state) = ArrayPages::of(&mut region.mesh, common);
     let mut mesh = Mesh::with_state(pages, state);
-    let counts = improve_all_but(&mut mesh, &others);
+    let (counts, bad) = improve_all_but(&mut mesh, &others);
     take_back(&mut region.mesh, &mut mesh, common);
     for face in kept {
         let across = region.mesh.tet(face.tet()).neighbor[face.face()];
@@ -49,6 +49,7 @@ pub(super) fn improve(
             region.mesh.tets[face.tet() as usize].node[face.face()] &= !REQUIRED;
         }
     }
+    region.list_to_mend(&bad);
     let bricks = std::mem::take(&mut region.bricks);
     region.place_new(n_vertices, |point| {
         let brick = bricks.binary_search(&partition.find(point));
@@ -275,6 +276,15 @@ fn take_back(to: &mut FlatMesh, mesh: &mut Mesh<ArrayPages>, common: Option<Attr
 }
 
 impl Region {
+    /// Lists what is left to mend: it lies in these pages, or where no page has an id.
+    fn list_to_mend(&mut self, pages: &[u32]) {
+        let tets = (0u32..).zip(&self.mesh.tets).filter(|&(t, tet)| {
+            let may_be = t & SLOT_MASK >= RECORDS || pages.binary_search(&(t >> SLOT_BITS)).is_ok();
+            may_be && tet.is_live() && is_to_mend(self.mesh.points(tet), tet.required_faces())
+        });
+        self.to_mend = Some(tets.map(|(t, _)| t).collect());
+    }
+
     /// Gives the vertices from `first` on that are in use a brick, told by the place of each; forgets others at the end.
     fn place_new(&mut self, first: usize, brick: impl Fn(Point) -> u32) {
         let is_used = |v: &Vertex| v.point.is_finite();

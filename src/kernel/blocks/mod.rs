@@ -14,6 +14,7 @@ mod brick;
 mod convert;
 mod divide;
 mod field;
+mod finish;
 mod flat;
 mod improve;
 mod insert;
@@ -41,6 +42,7 @@ use crate::optimize::{Mode, OperationCounts};
 use brick::Bricks;
 use divide::Divider;
 pub use field::Field;
+pub use finish::{Finished, FinishedTet, FinishedVertex};
 use part::Part;
 use partition::{KdPartition, TOO_STEEP};
 pub use placement::{Everywhere, PlacementRule};
@@ -85,20 +87,14 @@ pub fn saturate<P: Pages>(
     progress: &mut dyn FnMut(u64),
 ) -> BlockReport {
     if !field.place.is_partial() {
-        let load = load::predict(mesh, field);
-        load::check(load.tets);
-        let is_void = load.in_voids > COARSE_TETS.max(f64::from(mesh.n_tets()));
-        let coarser = if is_void { saturate_coarser(mesh, field, dir) } else { 0 };
-        let how = How { mode, is_final: true, rings: None };
-        let mut report = saturate_at(mesh, field, how, dir, &mut |n| progress(coarser + n));
-        report.refine.inserted += coarser;
-        return report;
+        return saturate_all(mesh, field, mode, dir, progress).into_pages(mesh);
     }
     let mut report = BlockReport::default();
     for rings in PART_RINGS {
         let before = report.refine.inserted;
         let how = How { mode, is_final: true, rings: Some(rings) };
-        let made = saturate_at(mesh, field, how, dir, &mut |n| progress(before + n));
+        let told = &mut |n| progress(before + n);
+        let made = saturate_at(mesh, field, how, dir, told).into_pages(mesh);
         report.operations.add(&made.operations);
         report.refine.add(&made.refine);
         report.refine.unexamined = made.refine.unexamined;
@@ -107,6 +103,68 @@ pub fn saturate<P: Pages>(
         }
     }
     report
+}
+
+/// Like [`saturate`] without bounds, for a mesh that is sealed next: where nothing is to be mended it stays in bricks, and `mesh` has
+/// vertices, facets and faces of interfaces alone.
+pub fn saturate_to_seal<P: Pages>(
+    mesh: &mut Mesh<P>,
+    field: &Field,
+    mode: Mode,
+    dir: &DiskPath,
+    progress: &mut dyn FnMut(u64),
+) -> (BlockReport, Option<Finished>) {
+    let mut saturated = saturate_all(mesh, field, mode, dir, progress);
+    let Some(look) = finish::look(&saturated.bricks, saturated.n_bricks) else {
+        return (saturated.into_pages(mesh), None);
+    };
+    saturated.report.refine.over_constrained = look.over_constrained;
+    let finished = Finished::new(saturated.bricks, saturated.n_bricks, look);
+    (saturated.report, Some(finished))
+}
+
+/// Saturates the whole mesh, at coarser lengths first where it is a large void.
+fn saturate_all<P: Pages>(
+    mesh: &mut Mesh<P>,
+    field: &Field,
+    mode: Mode,
+    dir: &DiskPath,
+    progress: &mut dyn FnMut(u64),
+) -> Saturated {
+    let load = load::predict(mesh, field);
+    load::check(load.tets);
+    let is_void = load.in_voids > COARSE_TETS.max(f64::from(mesh.n_tets()));
+    let coarser = if is_void { saturate_coarser(mesh, field, dir) } else { 0 };
+    let how = How { mode, is_final: true, rings: None };
+    let mut made = saturate_at(mesh, field, how, dir, &mut |n| progress(coarser + n));
+    made.report.refine.inserted += coarser;
+    made
+}
+
+/// A mesh, or a part of it, in bricks; the pages have the rest.
+struct Saturated {
+    bricks: Bricks,
+    n_bricks: u32,
+    part: Option<Part>,
+    /// Bytes of bricks and pages while the one becomes the other.
+    memory: [u64; 2],
+    report: BlockReport,
+}
+
+impl Saturated {
+    /// Puts all tetrahedra into pages.
+    fn into_pages<P: Pages>(mut self, mesh: &mut Mesh<P>) -> BlockReport {
+        let [bricks, pages] = self.memory;
+        self.bricks.limit(bricks as usize);
+        mesh.pages_mut().use_at_most(pages);
+        let is_whole = self.part.is_none();
+        let over_constrained = convert::to_pages(&self.bricks, self.n_bricks, mesh, self.part);
+        mesh.pages_mut().use_at_most(u64::MAX);
+        if is_whole {
+            self.report.refine.over_constrained = over_constrained;
+        }
+        self.report
+    }
 }
 
 /// Settings of one saturation.
@@ -126,7 +184,7 @@ fn saturate_at<P: Pages>(
     How { mode, is_final, rings }: How,
     dir: &DiskPath,
     progress: &mut dyn FnMut(u64),
-) -> BlockReport {
+) -> Saturated {
     let scaffold = scaffold::build(mesh, field);
     let part = rings.map(|rings| Part::around(mesh, field, rings));
     let samples = load::sample(mesh, field, part.as_ref());
@@ -175,16 +233,15 @@ fn saturate_at<P: Pages>(
         };
         graph.run(memory.threads, &Visitor::new, &visit, &mut told);
     }
-    visits.bricks.limit(memory.bricks / 2);
-    mesh.pages_mut().use_at_most(memory.pages_at_first);
-    let over_constrained = convert::to_pages(&visits.bricks, n_bricks as u32, mesh, part);
-    mesh.pages_mut().use_at_most(u64::MAX);
     let mut report = visits.report.into_inner().unwrap_or_else(PoisonError::into_inner);
     report.refine.unexamined = unexamined;
-    if rings.is_none() {
-        report.refine.over_constrained = over_constrained;
+    Saturated {
+        bricks: visits.bricks,
+        n_bricks: n_bricks as u32,
+        part,
+        memory: [(memory.bricks / 2) as u64, memory.pages_at_first],
+        report,
     }
-    report
 }
 
 /// Saturates the mesh for lengths of the scaffold: in a large void that takes less work than inserting its points one by one into
@@ -197,7 +254,7 @@ fn saturate_coarser<P: Pages>(mesh: &mut Mesh<P>, field: &Field, dir: &DiskPath)
     let h = |p| COARSER * (field.h)(p);
     let coarser = Field { h: &h, place: field.place, bounds: field.bounds };
     let how = How { mode: Mode::None, is_final: false, rings: None };
-    let made = saturate_at(mesh, &coarser, how, dir, &mut |_| ());
+    let made = saturate_at(mesh, &coarser, how, dir, &mut |_| ()).into_pages(mesh);
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, (field.h)(p) as f32);

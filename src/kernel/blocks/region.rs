@@ -36,6 +36,9 @@ pub(super) struct Region {
     /// Per brick: its first vertex and tetrahedron; at the end how many there are.
     first_vertex: Vec<u32>,
     first_tet: Vec<u32>,
+    /// Per brick whether something in it was to be mended, and what is now, if it was looked for.
+    was_to_mend: Vec<bool>,
+    pub to_mend: Option<Vec<u32>>,
     /// Faces that lead out: face, and the reference beyond as place and slot of a face.
     ways_out: Vec<(FaceRef, Slot)>,
     copies: IdMap<u64, u32>,
@@ -101,9 +104,12 @@ impl Region {
         self.copies.clear();
         self.first_vertex.clear();
         self.first_tet.clear();
+        self.was_to_mend.clear();
+        self.to_mend = None;
         for (place, brick) in (0u32..).zip(bricks) {
             self.first_vertex.push(mesh.vertices.len() as u32);
             self.first_tet.push(mesh.tets.len() as u32);
+            self.was_to_mend.push(brick.to_mend);
             mesh.tets.extend_from_slice(&brick.tets);
             mesh.attributes.extend_from_slice(&brick.attributes);
             for (slot, vertex) in (0u32..).zip(&brick.vertices) {
@@ -232,6 +238,12 @@ impl Region {
             made.push(brick);
         }
         self.restore_ways_out(&scratch.to, &mut made);
+        match &self.to_mend {
+            Some(tets) => tets.iter().for_each(|&t| {
+                made[(scratch.to[t as usize] >> SLOT_BITS) as usize].to_mend = true;
+            }),
+            None => (made.iter_mut().zip(&self.was_to_mend)).for_each(|(b, &was)| b.to_mend = was),
+        }
         self.scratch = scratch;
         made.into_iter().map(Arc::new).collect()
     }

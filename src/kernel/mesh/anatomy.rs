@@ -87,6 +87,11 @@ impl Tet {
     pub fn is_required(&self, i: usize) -> bool {
         self.node[i] & REQUIRED != 0
     }
+    /// The required faces, a bit for each.
+    #[inline]
+    pub fn required_faces(&self) -> u8 {
+        (0..4).fold(0, |bits, i| bits | u8::from(self.is_required(i)) << i)
+    }
     /// The vertices of face `i`, counter-clockwise seen from outside.
     #[inline]
     pub fn face(&self, i: usize) -> [u32; 3] {

@@ -48,5 +48,5 @@ pub use goals::OperationCounts;
 pub use lawson::LawsonStats;
 #[cfg(test)]
 pub use measure::{Histogram, QualityTable, measure};
-pub use mend::MendCounts;
+pub use mend::{MendCounts, is_to_mend};
 pub use run::{Mode, OptimizeReport, Progress, Settings, improve_all_but, mend, run, run_with};

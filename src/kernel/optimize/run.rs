@@ -144,19 +144,23 @@ pub fn mend<P: Pages>(mesh: &mut Mesh<P>, progress: &dyn Fn(Progress)) -> MendCo
 }
 
 /// Rounds for tetrahedra that need them, but for those listed, whose turn is another time. `tet_of` must be right, all marks down; so are
-/// they afterwards.
-pub fn improve_all_but<P: Pages>(mesh: &mut Mesh<P>, others: &[u32]) -> OperationCounts {
+/// they afterwards. Returns the pages too that hold bad tetrahedra still, if any do.
+pub fn improve_all_but<P: Pages>(
+    mesh: &mut Mesh<P>,
+    others: &[u32],
+) -> (OperationCounts, Vec<u32>) {
     let mut rounds = Rounds::new(PageFlags::all(mesh));
     rounds.pass_over(mesh, others);
     rounds.run(mesh, BAD, &mut |_, _| ());
     let bad = rounds.finish(mesh);
+    let mut left = PageFlags::default();
     for goal in [WORST, SHARE] {
         rounds.flags.clone_from(&bad);
         rounds.pass_over(mesh, others);
         rounds.run(mesh, goal, &mut |_, _| ());
-        rounds.finish(mesh);
+        left = rounds.finish(mesh);
     }
-    rounds.counts
+    (rounds.counts, left.take_all())
 }
 
 /// Takes the marks down that refinement leaves, and points each vertex to its tetrahedron of smallest id.

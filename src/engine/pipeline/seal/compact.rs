@@ -1,8 +1,8 @@
-//! Seals a finished working mesh: renumbers it along the Hilbert curve, drops neighbors and compresses.
+//! Seals a finished mesh: renumbers it so that what is near in space is near in the file, drops neighbors and compresses.
 //!
 //! Every stage is a stream or an external sort, so a mesh of any size passes through a small lease:
-//! 1. vertices are sorted along the curve; their places become their numbers (a scratch map holds old → new);
-//! 2. tetrahedra are sorted by their new numbers, smallest vertex first, which also follows the curve;
+//! 1. vertices get their numbers brick by brick; those of a mesh in pages are sorted along the Hilbert curve (a scratch map holds old → new);
+//! 2. tetrahedra come sorted by their new numbers, smallest vertex first;
 //! 3. their required faces are sorted by vertices and joined with the facets, which gives each facet its tetrahedra.
 
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
@@ -19,6 +19,7 @@ use tetdb_base::geom::HilbertFrame;
 use tetdb_base::storage::{
     KeyedId, Pages, SortRecord, Sorted, Sorter, StorageError, check_cancelled, kind, spare_threads,
 };
+use tetdb_kernel::blocks::{Finished, FinishedTet, FinishedVertex};
 use tetdb_kernel::mesh::anatomy::FACES;
 use tetdb_kernel::mesh::{Mesh, Scan, VertexTag, dense, scan_parts, sparse, tets_of_page};
 use tetdb_store::sealed::{Form, Sealed, SealedWriter, sorted_face};
@@ -26,11 +27,12 @@ use tetdb_store::sealed::{Form, Sealed, SealedWriter, sorted_face};
 /// Bytes that a writer holds beside its share of the buffers, however small that is: tables of faces, chunks being packed. Pages make room.
 const WRITER_BYTES: u64 = 12 << 20;
 
-/// Writes `mesh` to `target`, with the order and numbers of a sealed sub-domain in every storage form.
+/// Writes `mesh`, or `finished` in its place with its facets, to `target`. The order and the numbers are the same in every storage form.
 ///
-/// Invariant: `tet_of` is right for all vertices. Effects: the mesh's scratch map is overwritten and cleared.
+/// Invariant: `tet_of` is right for all vertices of a mesh in pages. Effects: the mesh's scratch map is overwritten and cleared.
 pub fn seal<P: Pages>(
     mesh: &mut Mesh<P>,
+    finished: Option<Finished>,
     target: &SealTarget,
     watch: &Watcher,
 ) -> Result<Sealed, PipelineError> {
@@ -41,26 +43,64 @@ pub fn seal<P: Pages>(
         target.generation,
         (target.memory / 2) as usize,
     )?;
-    if let Some([_, most]) = mesh.pages().bytes_used() {
-        mesh.pages_mut().use_at_most(most.saturating_sub(WRITER_BYTES).max(most / 2));
-    }
-    mesh.clear_scratch();
-    vertices(mesh, target, &mut writer, watch)?;
-    let mut neighbors = match target.form {
-        Form::Packed => None,
-        Form::Pages => Some(Neighbors::of(sort_tets(mesh, target)?, target)?),
+    let faces = match finished {
+        Some(finished) => seal_bricks(mesh, &finished, target, &mut writer, watch)?,
+        None => seal_pages(mesh, target, &mut writer, watch)?,
     };
-    let order = sort_tets(mesh, target)?;
-    let faces = tets(order, mesh.n_tets(), &mut neighbors, target, &mut writer, watch)?;
     facets(mesh, faces, target, &mut writer)?;
     mesh.clear_scratch();
     mesh.pages_mut().use_at_most(u64::MAX);
     Ok(writer.finish()?)
 }
 
-fn report_progress(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
+/// Writes the vertices and tetrahedra of a mesh in bricks; returns the required faces. `mesh` has the rest.
+fn seal_bricks<P: Pages>(
+    mesh: &mut Mesh<P>,
+    finished: &Finished,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+    watch: &Watcher,
+) -> Result<Sorted<RequiredTetFace>, PipelineError> {
+    finished.make_room(WRITER_BYTES);
+    let (frame, mut local) = (HilbertFrame::new(&target.bounds), 0);
+    finished.number(mesh, &frame, vertices_at_once(target), &mut |some| {
+        report_progress(watch, "seal vertices", u64::from(local), finished.n_vertices());
+        let records = (local..).zip(some).map(|(n, v)| record(v, n, target.subdomain));
+        writer.push_vertices(&records.collect::<Vec<_>>())?;
+        local += some.len() as u32;
+        Ok::<_, PipelineError>(())
+    })?;
+    let order = || finished.tets().map(|tet| Ok(record_of(tet)));
+    let mut neighbors = match target.form {
+        Form::Packed => None,
+        Form::Pages => Some(Neighbors::of(order(), target)?),
+    };
+    tets(order(), finished.n_tets(), &mut neighbors, target, writer, watch)
+}
+
+/// The same for a mesh in pages.
+fn seal_pages<P: Pages>(
+    mesh: &mut Mesh<P>,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+    watch: &Watcher,
+) -> Result<Sorted<RequiredTetFace>, PipelineError> {
+    if let Some([_, most]) = mesh.pages().bytes_used() {
+        mesh.pages_mut().use_at_most(most.saturating_sub(WRITER_BYTES).max(most / 2));
+    }
+    mesh.clear_scratch();
+    vertices(mesh, target, writer, watch)?;
+    let mut neighbors = match target.form {
+        Form::Packed => None,
+        Form::Pages => Some(Neighbors::of(sort_tets(mesh, target)?, target)?),
+    };
+    let order = sort_tets(mesh, target)?;
+    tets(order, u64::from(mesh.n_tets()), &mut neighbors, target, writer, watch)
+}
+
+fn report_progress(watch: &Watcher, stage: &'static str, done: u64, total: u64) {
     check_cancelled();
-    watch(Event { stage, done, total: Some(u64::from(total)), unit: "records" });
+    watch(Event { stage, done, total: Some(total), unit: "records" });
 }
 
 fn vertices<P: Pages>(
@@ -78,19 +118,14 @@ fn vertices<P: Pages>(
         }
     }
     let (mut order, mut local) = (sorter.finish()?, 0);
-    // With memory for it each thread has a batch to pack.
-    let batch_bytes = (IDS * BATCH * size_of::<SealedVertex>()) as u64;
-    let n_batches = (target.memory / 16 / batch_bytes).clamp(1, spare_threads() as u64) as usize;
+    let at_once = vertices_at_once(target);
     loop {
-        let ids = order
-            .by_ref()
-            .take(IDS * BATCH * n_batches)
-            .map(|record| Ok::<_, StorageError>(record?.id));
+        let ids = order.by_ref().take(at_once).map(|record| Ok::<_, StorageError>(record?.id));
         let ids: Vec<u32> = ids.collect::<Result<_, _>>()?;
         if ids.is_empty() {
             return Ok(());
         }
-        report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+        report_progress(watch, "seal vertices", u64::from(local), u64::from(mesh.n_vertices()));
         let scan = Vertices { ids: &ids, first: local, subdomain: target.subdomain };
         let parts: Vec<u32> = (0..ids.len().div_ceil(IDS) as u32).collect();
         writer.push_vertices(&scan_parts(mesh, &parts, &scan).concat())?;
@@ -99,6 +134,13 @@ fn vertices<P: Pages>(
             local += 1;
         }
     }
+}
+
+/// Vertices written at once: with memory for it each thread has a batch to pack.
+fn vertices_at_once(target: &SealTarget) -> usize {
+    let batch_bytes = (IDS * BATCH * size_of::<SealedVertex>()) as u64;
+    let n_batches = (target.memory / 16 / batch_bytes).clamp(1, spare_threads() as u64);
+    IDS * BATCH * n_batches as usize
 }
 
 /// Vertices scanned as one part.
@@ -139,26 +181,22 @@ impl Scan for Vertices<'_> {
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &part: &u32) -> Vec<SealedVertex> {
         let ids = self.ids.iter().zip(self.first..).skip(part as usize * IDS).take(IDS);
-        let record = |(&v, local)| {
-            let (point, h) = mesh.point_and_size(v);
-            let (vertex_tag, owner_index) = mesh.vertex_attribute(v);
-            let (tag, id) = match vertex_tag {
-                VertexTag::Surface => {
-                    let id = VertexId { owner: Owner::Surface, index: owner_index };
-                    (tag::SURFACE, id.number())
-                }
-                VertexTag::Interface => {
-                    let (cut, index) = mesh.interface_vertex(v);
-                    let owner = Owner::Cut(cut);
-                    (tag::INTERFACE, VertexId { owner, index }.number())
-                }
-                VertexTag::Steiner => (tag::STEINER, SealedVertex::own_id(self.subdomain, local)),
-                _ => (tag::FREE, SealedVertex::own_id(self.subdomain, local)),
-            };
-            SealedVertex { point: point.to_array(), h, tag, id }
-        };
-        ids.map(record).collect()
+        ids.map(|(&v, local)| record(&FinishedVertex::of(mesh, v), local, self.subdomain)).collect()
     }
+}
+
+/// The record of a vertex that is number `local`.
+fn record(vertex: &FinishedVertex, local: u32, subdomain: SubdomainId) -> SealedVertex {
+    let (cut, index) = vertex.owner;
+    let (tag, id) = match vertex.tag {
+        VertexTag::Surface => (tag::SURFACE, VertexId { owner: Owner::Surface, index }.number()),
+        VertexTag::Interface => {
+            (tag::INTERFACE, VertexId { owner: Owner::Cut(cut), index }.number())
+        }
+        VertexTag::Steiner => (tag::STEINER, SealedVertex::own_id(subdomain, local)),
+        _ => (tag::FREE, SealedVertex::own_id(subdomain, local)),
+    };
+    SealedVertex { point: vertex.point.to_array(), h: vertex.h, tag, id }
 }
 
 /// Parts scanned before their records go on: 4 MB of tetrahedra.
@@ -179,6 +217,10 @@ fn sort_tets<P: Pages>(
     Ok(sorter.finish()?)
 }
 
+fn record_of(FinishedTet { tet, flags, required }: FinishedTet) -> TetRecord {
+    TetRecord { nodes: tet.nodes, region: tet.region, flags, required }
+}
+
 /// Scan that returns the tetrahedra of a page under their new numbers.
 struct Records;
 
@@ -193,16 +235,7 @@ impl Scan for Records {
             for (i, node) in nodes.iter_mut().enumerate() {
                 *node = mesh.scratch(dense(tet.vertex(i)));
             }
-            let (region, flags) = mesh.tet_attribute(t);
-            let rotated = SealedTet { nodes, region }.rotated();
-            let mut required = 0;
-            if (0..4).any(|i| tet.is_required(i)) {
-                for (i, node) in rotated.nodes.into_iter().enumerate() {
-                    let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
-                    required |= u8::from(tet.is_required(old)) << i;
-                }
-            }
-            let record = TetRecord { nodes: rotated.nodes, region, flags, required };
+            let record = record_of(FinishedTet::new(&tet, nodes, mesh.tet_attribute(t)));
             records.push(record.to_bytes());
         });
         records
@@ -210,8 +243,8 @@ impl Scan for Records {
 }
 
 fn tets(
-    order: Sorted<TetRecord>,
-    n_tets: u32,
+    order: impl Iterator<Item = Result<TetRecord, StorageError>> + Send,
+    n_tets: u64,
     neighbors: &mut Option<Neighbors>,
     target: &SealTarget,
     writer: &mut SealedWriter,

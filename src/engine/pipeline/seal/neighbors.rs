@@ -5,7 +5,7 @@ use tetdb_schema::page::NONE;
 use super::records::{NeighborLink, SortedTetFace, TetRecord};
 use super::target::SealTarget;
 use crate::pipeline::error::PipelineError;
-use tetdb_base::storage::{Sorted, Sorter, check_cancelled};
+use tetdb_base::storage::{Sorted, Sorter, StorageError, check_cancelled};
 use tetdb_kernel::mesh::anatomy::FACES;
 use tetdb_store::sealed::sorted_face;
 
@@ -18,7 +18,10 @@ pub struct Neighbors {
 
 impl Neighbors {
     /// Finds the neighbors of tetrahedra in their new order. Errors: the disk.
-    pub fn of(order: Sorted<TetRecord>, target: &SealTarget) -> Result<Self, PipelineError> {
+    pub fn of(
+        order: impl Iterator<Item = Result<TetRecord, StorageError>>,
+        target: &SealTarget,
+    ) -> Result<Self, PipelineError> {
         let memory = target.memory / 4;
         let mut faces = Sorter::new(target.scratch, memory);
         for (t, record) in order.enumerate() {

@@ -6,7 +6,7 @@ use super::common::Common;
 use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::storage::{DiskPath, Pages};
 use tetdb_kernel::bisect::{OutsideZones, Zone};
-use tetdb_kernel::blocks::{self, Everywhere, Field, PlacementRule, RefineReport};
+use tetdb_kernel::blocks::{self, Everywhere, Field, Finished, PlacementRule, RefineReport};
 use tetdb_kernel::mesh::Mesh;
 use tetdb_kernel::optimize::{self, Mode, OptimizeReport};
 use tetdb_kernel::sizing::SizeField;
@@ -22,7 +22,8 @@ pub struct FineReport {
     pub seconds: [f64; 2],
 }
 
-/// Divides the edges of a coarse mesh and optimizes it. No vertex is added in `zones`, which are final.
+/// Divides the edges of a coarse mesh and optimizes it. No vertex is added in `zones`, which are final. Where nothing is left to
+/// do the mesh is returned in bricks, and is no longer in `mesh`.
 pub fn saturate_and_optimize<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &SizeField,
@@ -30,7 +31,7 @@ pub fn saturate_and_optimize<P: Pages>(
     zones: &[Zone],
     dir: &DiskPath,
     watch: &Watcher,
-) -> FineReport {
+) -> (FineReport, Option<Finished>) {
     watch(Event { stage: "divide edges", done: 0, total: None, unit: "vertices" });
     let clock = Instant::now();
     for v in mesh.vertex_ids() {
@@ -44,15 +45,19 @@ pub fn saturate_and_optimize<P: Pages>(
     let told = &mut |inserted| {
         watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
     };
-    let report = blocks::saturate(mesh, &wanted, common.mode, dir, told);
+    let (report, finished) = match common.mode {
+        Mode::None => (blocks::saturate(mesh, &wanted, Mode::None, dir, told), None),
+        mode => blocks::saturate_to_seal(mesh, &wanted, mode, dir, told),
+    };
     let refined = clock.elapsed().as_secs_f64();
     let mut optimize =
         OptimizeReport { operations: report.operations, ..OptimizeReport::default() };
     match common.mode {
+        _ if finished.is_some() => {}
         Mode::Full => optimize.mended = optimize::mend(mesh, &|p| watch(p.into())),
         Mode::Delaunay => mesh.refresh_tet_of(),
         Mode::None => optimize = optimize::run(mesh, common.mode, &|p| watch(p.into())),
     }
     let seconds = [refined, clock.elapsed().as_secs_f64() - refined];
-    FineReport { refine: report.refine, optimize, seconds }
+    (FineReport { refine: report.refine, optimize, seconds }, finished)
 }

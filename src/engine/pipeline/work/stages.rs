@@ -62,7 +62,7 @@ impl StageFiles<'_> {
             owners: None,
         };
         mesh.refresh_tet_of();
-        stages.sealed.push((stage, seal(mesh, &target, watch)?));
+        stages.sealed.push((stage, seal(mesh, None, &target, watch)?));
         Ok(())
     }
 }

@@ -98,7 +98,7 @@ impl SubdomainJob {
             None => None,
         };
         let keep_s = clock.seconds();
-        let fine = saturate_and_optimize(
+        let (fine, finished) = saturate_and_optimize(
             &mut mesh,
             self.field.as_ref().unwrap_or(common.field),
             common,
@@ -118,7 +118,7 @@ impl SubdomainJob {
             owners: Some(&self.owners),
         };
         let seal_clock = StepClock::start();
-        let sealed = seal(&mut mesh, &target, watch)?;
+        let sealed = seal(&mut mesh, finished, &target, watch)?;
         let seal_seconds = seal_clock.seconds();
         let pager = mesh.into_pages();
         let (pages, frames_used) = (pager.stats(), pager.frames_used());

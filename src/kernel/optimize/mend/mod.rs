@@ -35,6 +35,7 @@ use face_bounds::Measure;
 use list::Judges;
 pub use operator::MendCounts;
 use operator::{Attacks, Operator};
+pub use stages::is_to_mend;
 use stages::{STAGES, Stage, WORST, judge};
 use star::Goal;
 use tetdb_base::storage::{Pages, check_cancelled};

@@ -12,7 +12,9 @@
 use super::face_bounds::FaceBounds;
 use super::star::Goal;
 use super::vertex::FLAT;
+use crate::mesh::anatomy::FACES;
 use crate::mesh::{Mesh, Tet};
+use tetdb_base::geom::Point;
 use tetdb_base::shape::face_floor;
 use tetdb_base::shape::{is_below, quality};
 use tetdb_base::storage::Pages;
@@ -84,6 +86,16 @@ pub(super) const STAGES: [Stage; 5] = [
     },
     WORST,
 ];
+
+/// Whether a tetrahedron of these corners and required faces, bit by bit, may be mended: a mesh without such ones stays as it is.
+pub fn is_to_mend(points: [Point; 4], required: u8) -> bool {
+    if !is_below(points, 1.0 / WORST.quality_max) {
+        return false;
+    }
+    let most = quality(points) / WORST.excess_max;
+    let floor = |i: usize| face_floor(FACES[i].map(|k| points[k]));
+    !(0..4).any(|i| required >> i & 1 != 0 && most <= floor(i))
+}
 
 impl Stage {
     /// The same where only those are bad that are flat.
