@@ -21,7 +21,7 @@ PICTURES = [
     ("Many bodies", "Forty empty balls in a cube. Every triangle of their surfaces is a face of the mesh.", "balls",
      ["mesh sample:balls,count=40,seed=5 -o balls.tetdb", "snapshot balls.tetdb balls.png --surface --plane 0.5,0.5,0.5,1,0.2,0.3 --from 1,0.5,0.4"]),
     ("A cut through a large mesh", "Sub-domains of a mesh that need not fit in memory. The cut reads only what its plane meets.", "large",
-     ["mesh sample:balls,count=300,h={h} -o large.tetdb --memory 1GiB --subdomains 16 --no-verify", "snapshot large.tetdb large.png --plane 0.5,0.37,0.5,0,-1,0"]),
+     ["mesh sample:balls,count=300,h={h} -o large.tetdb --memory 1GiB --subdomains 16 --no-verify", "snapshot large.tetdb large.png --plane 0.5,0.37,0.5,0,-1,0 --crinkle"]),
     ("Bodies and what is between them", "Balls, each a region of its own, and the region around them. Where materials meet, they share faces.", "inclusions",
      ["mesh sample:balls,count=60,seed=3 -o inclusions.tetdb --regions all", "snapshot inclusions.tetdb inclusions.png --surface --plane 0.5,0.5,0.5,1,0.3,0.2 --from 1,0.4,0.4 --color region"]),
     ("Grains", "Convex grains, each a region of its own, in a cut that leaves tetrahedra whole.", "grains",
