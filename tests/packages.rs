@@ -96,6 +96,8 @@ fn versions_addresses_and_words_are_the_same_everywhere() {
     let recipe = read("tools/packages/conda/meta.yaml");
     assert_eq!(line(&recipe, "{% set version ="), format!("{version}\" %}}"));
     assert_eq!(line(&recipe, "license:"), licence);
+    assert_eq!(line(&recipe, "home:"), text("homepage"));
+    assert_eq!(line(&recipe, "dev_url:"), text("repository"));
 
     let dependencies = table("Cargo.toml")["workspace"]["dependencies"].clone();
     for (name, dependency) in dependencies.as_table().expect("a table") {

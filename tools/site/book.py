@@ -70,6 +70,11 @@ def items(api: Path) -> dict[str, str]:
     return found
 
 
+def option(found: re.Match[str]) -> str:
+    """An option in one piece: a browser breaks lines behind hyphens, also behind the first. As `--`, two hyphens would become a dash."""
+    return f'<code class="option">{found[1].replace("-", "&#45;")}</code>'
+
+
 class Links:
     """Where links of a page lead in the site."""
 
@@ -100,6 +105,8 @@ class Links:
                 inside = not inside
             elif not inside:
                 line = re.sub(r"(?<=\]\()([^)\s]+)(?=\))", lambda m: self.leads(page, m[1]), line)
+                if not line.startswith("#"):
+                    line = re.sub(r"`(--?[\w-]+)`", option, line)
                 line = re.sub(r"^\[([^]]+)\]: (\S+)$", lambda m: f"[{m[1]}]: {self.items.get(m[1]) or self.leads(page, m[2])}", line)
             lines.append(line)
         return "\n".join(lines) + "\n"

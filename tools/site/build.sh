@@ -28,7 +28,7 @@ cp -r "$doc" "$site/api"
 if [ -n "$wheel" ]; then
     python3 -m venv "$work/python"
     "$work/python/bin/pip" install --quiet "$wheel" pdoc
-    "$work/python/bin/pdoc" --docformat numpy --output-directory "$site/python" tetdb
+    "$work/python/bin/python" tools/site/reference.py "$site/python"
 else
     echo "site: without the reference of Python: no wheel is named"
 fi

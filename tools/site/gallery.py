@@ -15,12 +15,13 @@ import tempfile
 from pathlib import Path
 
 SIZE = "--size 1200x900"
+# Cuts are drawn away from the interfaces, which lie near middles: along one, a cut is a patchwork of both sides.
 # Title, text, name, commands. The store that is counted is NAME.tetdb, and the last command draws NAME.png.
 PICTURES = [
     ("Many bodies", "Forty empty balls in a cube. Every triangle of their surfaces is a face of the mesh.", "balls",
      ["mesh sample:balls,count=40,seed=5 -o balls.tetdb", "snapshot balls.tetdb balls.png --surface --plane 0.5,0.5,0.5,1,0.2,0.3 --from 1,0.5,0.4"]),
     ("A cut through a large mesh", "Sub-domains of a mesh that need not fit in memory. The cut reads only what its plane meets.", "large",
-     ["mesh sample:balls,count=300,h={h} -o large.tetdb --memory 1GiB --subdomains 16 --no-verify", "snapshot large.tetdb large.png --plane 0.5,0.5,0.5,0,-1,0"]),
+     ["mesh sample:balls,count=300,h={h} -o large.tetdb --memory 1GiB --subdomains 16 --no-verify", "snapshot large.tetdb large.png --plane 0.5,0.37,0.5,0,-1,0 --crinkle"]),
     ("Bodies and what is between them", "Balls, each a region of its own, and the region around them. Where materials meet, they share faces.", "inclusions",
      ["mesh sample:balls,count=60,seed=3 -o inclusions.tetdb --regions all", "snapshot inclusions.tetdb inclusions.png --surface --plane 0.5,0.5,0.5,1,0.3,0.2 --from 1,0.4,0.4 --color region"]),
     ("Grains", "Convex grains, each a region of its own, in a cut that leaves tetrahedra whole.", "grains",
@@ -29,9 +30,9 @@ PICTURES = [
      ["mesh sample:knot,h=0.045 -o knot.tetdb --subdomains 4", "snapshot knot.tetdb knot.png --surface --color subdomain"]),
     ("An interface", "Faces that two sub-domains share, chosen among those of the mesh before it was cut.", "interface",
      ["mesh sample:box,h=0.05 -o interface.tetdb --subdomains 2 --keep-stages", "snapshot interface.tetdb interface.png --stage 1:interface"]),
-    ("One sub-domain meshed again", "Half the lengths in one of four sub-domains. Interfaces and the other three stay as they were.", "again",
+    ("One sub-domain meshed again", "Half the lengths in sub-domain 1 of four. Interfaces and the other three stay as they were.", "again",
      ["mesh sample:box,h=0.04 -o again.tetdb --subdomains 4", "resaturate again.tetdb --subdomain 1 --refine-by 0.5",
-      "snapshot again.tetdb again.png --plane 0.5,0.5,0.5,0,0,1 --crinkle"]),
+      "snapshot again.tetdb again.png --plane 0.4,0.5,0.5,1,0,0 --crinkle"]),
     ("Adapted to a field", "A field with a steep front, and the mesh that is best for its values, for a wanted number of tetrahedra.", "adapted",
      ["mesh sample:box,h=0.06 -o adapted.tetdb",
       "field adapted.tetdb add u --at vertices --from '1/(1+exp(40*(sqrt((x-0.5)^2+(y-0.5)^2+(z-0.5)^2)-0.3)))'",
@@ -39,8 +40,8 @@ PICTURES = [
     ("Sizes", "Edges of 0.02 in a ball, at most 0.15 away from it.", "sizes",
      ["mesh sample:box,h=0.15 -o sizes.tetdb --refine-surface --size-sphere 0.5,0.5,0.5,0.15,0.02,0.15", "snapshot sizes.tetdb sizes.png --color size --crinkle"]),
     ("A network of faults", "Faults that cut each other and end inside a block of rock: the tetrahedra on both sides of them.", "faults",
-     ["sample faults,count=9,cells=24,seed=5 -o faults.obj", "mesh faults.obj --embed faults_sheets.obj -o faults.tetdb",
-      "query faults.tetdb --touching-sheet -o near.vtu", "import near.vtu -o near.tetdb", "snapshot near.tetdb faults.png --surface --from 1,0.5,0.6"]),
+     ["sample faults,count=9,cells=40,seed=5 -o faults.obj", "mesh faults.obj --embed faults_sheets.obj -o faults.tetdb",
+      "query faults.tetdb --touching-sheet -o near.vtu", "import near.vtu -o near.tetdb", "snapshot near.tetdb faults.png --surface --from 0.4,1,0.6"]),
     ("Layers and wells", "Layers of rock, a region each. Edges of the mesh run along the wells, and sensors are vertices.", "wells",
      ["sample wells,count=12,cells=16 -o wells.obj",
       "mesh wells.obj wells_sheets.obj --regions all --embed-edges wells_wires.obj --embed-points wells_wires.obj -o wells.tetdb",

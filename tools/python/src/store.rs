@@ -334,12 +334,14 @@ impl Store {
                 "surface" => Snapshot::surface(),
                 _ => Snapshot::cut(),
             };
-            picture = picture.color(match words.color.as_str() {
-                "region" => ColorBy::Region,
-                "quality" => ColorBy::Quality,
-                "size" => ColorBy::Size,
-                _ => ColorBy::Subdomain,
-            });
+            picture = match words.color.as_str() {
+                "subdomain" => picture.color(ColorBy::Subdomain),
+                "region" => picture.color(ColorBy::Region),
+                "quality" => picture.color(ColorBy::Quality),
+                "size" => picture.color(ColorBy::Size),
+                "label" => picture.color(ColorBy::Label),
+                field => picture.color_field(field),
+            };
             if let Some([point, normal]) = words.plane {
                 picture = picture.plane(point, normal);
             }

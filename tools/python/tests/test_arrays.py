@@ -252,6 +252,7 @@ def test_a_store_shows_itself(parts: tetdb.Store, tmp_path: Path) -> None:
     assert "data:image/png;base64," in parts._repr_html_()
     parts.snapshot(tmp_path / "s.svg", color="quality", plane=((0.5, 0.5, 0.5), (1, 0, 0)), crinkle=True)
     parts.snapshot(tmp_path / "s.png", kind="surface", seen_from=(1, 1, 1), pixels=(80, 60))
+    parts.snapshot(tmp_path / "l.svg", kind="surface", color="label")
     parts.report(tmp_path / "r.html")
-    assert all((tmp_path / name).stat().st_size > 500 for name in ("s.svg", "s.png", "r.html"))
+    assert all((tmp_path / name).stat().st_size > 500 for name in ("s.svg", "s.png", "l.svg", "r.html"))
     assert parts.verify(full=False).ok

@@ -39,6 +39,20 @@ def test_arrays_come_back(st: tetdb.Store) -> None:
     assert len(hits) and (hits["centroid"][:, 0] > 0.9).all()
 
 
+def test_pictures_are_colored_by_fields(st: tetdb.Store, tmp_path: Path) -> None:
+    st.fields["T"] = lambda points: 300 + points[:, 0]
+    st.fields["u"] = lambda points: points
+    assert st.fields.columns == ["T", "u.x", "u.y", "u.z"]
+    pictures = []
+    for color in ("T", "u.x", "u.z"):
+        st.snapshot(tmp_path / "a.png", color=color, pixels=(80, 60), plane=((0.5, 0.5, 0.5), (0, 1, 0)))
+        pictures.append((tmp_path / "a.png").read_bytes())
+    assert pictures[0] != pictures[2] and pictures[1] != pictures[2]
+    with pytest.raises(tetdb.TetdbError, match="u.x"):
+        st.snapshot(tmp_path / "b.png", color="u")
+    assert not (tmp_path / "b.png").exists()
+
+
 def test_callables_give_values_chunk_by_chunk(parts: tetdb.Store, tmp_path: Path) -> None:
     shutil.copytree(parts.path, tmp_path / "a.tetdb")
     with tetdb.open(tmp_path / "a.tetdb") as st:

@@ -73,6 +73,11 @@ class Fields(MutableMapping[str, Any]):
     def _said(self) -> list[dict[str, Any]]:
         return list(json.loads(self._store._native.fields()))
 
+    @property
+    def columns(self) -> list[str]:
+        """What conditions and pictures call the fields: by name, or by component, such as ``u.x``."""
+        return [str(column) for field in self._said() for column in field["columns"]]
+
     def __iter__(self) -> Iterator[str]:
         return iter([field["name"] for field in self._said()])
 

@@ -42,6 +42,7 @@ _FACET = np.dtype(
     [("triangle", "<i8"), ("vertices", "<i4", 3), ("label", "<i4"), ("regions", "<i4", 2), ("tets", "<i4", 2)]
 )
 
+_COLORS = ("subdomain", "region", "quality", "size", "label")
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
 Ids = npt.NDArray[np.int64]
@@ -618,8 +619,8 @@ class Store:
         ----------
         kind : {"cut", "surface"}
             A cut through the mesh, or the surface in space.
-        color : {"subdomain", "region", "quality", "size"}
-            What colors stand for.
+        color : {"subdomain", "region", "quality", "size", "label"} or a field
+            What colors stand for: `label` of a surface, a field, or a component such as ``"u.x"``, of a cut.
         plane : (point, normal), optional
             Where it is cut; by default through the middle.
         seen_from : (3,), optional
@@ -636,7 +637,7 @@ class Store:
             os.fspath(path),
             {
                 "kind": _options.one_of(kind, ("cut", "surface"), "kind"),
-                "color": _options.one_of(color, ("subdomain", "region", "quality", "size"), "color"),
+                "color": _options.one_of(color, (*_COLORS, *self.fields.columns), "color"),
                 "plane": flat,
                 "seen_from": None if seen_from is None else _sizes.numbers(seen_from, 3, "seen_from", "bad-query"),
                 "condition": where,
