@@ -13,7 +13,7 @@ use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
 use crate::mesh::{FaceRef, Mesh, Scan, Tet, dense, scan_parts, sparse};
 use tetdb_base::geom::mix;
-use tetdb_base::storage::{Pages, StorageError, raise};
+use tetdb_base::storage::{Pages, StorageError, raise, spare_threads};
 
 /// A slot of a brick in one word of the scratch map. Bricks are fewer than the bits left.
 fn packed(to: Slot) -> u32 {
@@ -56,7 +56,7 @@ pub(super) fn to_bricks<P: Pages>(
     }
     let mut counts = vec![0u32; partition.n_bricks()];
     let ranges: Vec<u32> = (0..n_vertices).step_by(AT_ONCE).collect();
-    for ranges in ranges.chunks(BATCH) {
+    for ranges in ranges.chunks(parts_at_once()) {
         for mut found in scan_parts(mesh, ranges, &Placed { partition, end: n_vertices }) {
             for (brick, vertex) in &found {
                 let to = next_slot(&mut counts, *brick);
@@ -82,13 +82,17 @@ pub(super) fn to_bricks<P: Pages>(
     mesh.clear_scratch();
 }
 
-/// Vertices, or tetrahedra, that one thread converts at once, and such parts taken together: some megabytes.
+/// Vertices, or tetrahedra, that one thread converts at once.
 const AT_ONCE: usize = 2_048;
-const BATCH: usize = 16;
+
+/// Such parts taken together: some megabytes for all threads.
+fn parts_at_once() -> usize {
+    2 * spare_threads().min(8)
+}
 
 /// Parts of the next members.
 fn some_of(members: &mut impl Iterator<Item = (u32, bool)>) -> Vec<Vec<(u32, bool)>> {
-    let parts = (0..BATCH).map(|_| members.by_ref().take(AT_ONCE).collect::<Vec<_>>());
+    let parts = (0..parts_at_once()).map(|_| members.by_ref().take(AT_ONCE).collect::<Vec<_>>());
     parts.filter(|part| !part.is_empty()).collect()
 }
 

@@ -27,7 +27,7 @@ const PARTS: usize = 16;
 /// Samples kept. Where there are more, every second one goes, and the others count twice.
 const SAMPLES_MAX: usize = 1 << 19;
 /// Bytes of that many.
-const SAMPLES_BYTES: u64 = (SAMPLES_MAX * size_of::<Sample>()) as u64;
+pub(super) const SAMPLES_BYTES: u64 = (SAMPLES_MAX * size_of::<Sample>()) as u64;
 
 /// Some predicted tetrahedra and their place.
 #[derive(Clone, Copy, Debug)]

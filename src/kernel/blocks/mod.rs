@@ -187,8 +187,14 @@ fn saturate_at<P: Pages>(
 ) -> Saturated {
     let scaffold = scaffold::build(mesh, field);
     let part = rings.map(|rings| Part::around(mesh, field, rings));
+    if let Some([_, most]) = mesh.pages().bytes_used() {
+        // Pages make room for the samples, and for what is sorted of them.
+        let rest = most.saturating_sub(2 * load::SAMPLES_BYTES).max(most / 2);
+        mesh.pages_mut().use_at_most(rest);
+    }
     let samples = load::sample(mesh, field, part.as_ref());
     let partition = KdPartition::new(samples, field.bounds, field.h);
+    mesh.pages_mut().use_at_most(u64::MAX);
     load::check(partition.load());
     let n_bricks = partition.n_bricks();
     let memory = Memory::of(mesh, &partition);
