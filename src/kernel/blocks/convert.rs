@@ -57,7 +57,7 @@ pub(super) fn to_bricks<P: Pages>(
     let mut counts = vec![0u32; partition.n_bricks()];
     let ranges: Vec<u32> = (0..n_vertices).step_by(AT_ONCE).collect();
     for ranges in ranges.chunks(parts_at_once()) {
-        for mut found in scan_parts(mesh, ranges, &Placed { partition, end: n_vertices }) {
+        for mut found in scan_parts(mesh, ranges, &VertexHomes { partition, end: n_vertices }) {
             for (brick, vertex) in &found {
                 let to = next_slot(&mut counts, *brick);
                 mesh.set_scratch(dense(vertex.note), packed(to));
@@ -72,7 +72,7 @@ pub(super) fn to_bricks<P: Pages>(
     counts.fill(0);
     let mut members = Members::new(part, n_tets).peekable();
     while members.peek().is_some() {
-        for found in scan_parts(mesh, &some_of(&mut members), &Homes) {
+        for found in scan_parts(mesh, &some_of(&mut members), &TetHomes) {
             for (k, brick) in found {
                 mesh.set_scratch(n_vertices + k, packed(next_slot(&mut counts, brick)));
             }
@@ -97,12 +97,12 @@ fn some_of(members: &mut impl Iterator<Item = (u32, bool)>) -> Vec<Vec<(u32, boo
 }
 
 /// Scan that returns the vertices marked in the scratch map, from a dense id on, and their bricks.
-struct Placed<'a> {
+struct VertexHomes<'a> {
     partition: &'a KdPartition,
     end: u32,
 }
 
-impl Scan for Placed<'_> {
+impl Scan for VertexHomes<'_> {
     type Part = u32;
     type Output = Vec<(u32, Vertex)>;
 
@@ -122,9 +122,9 @@ impl Scan for Placed<'_> {
 }
 
 /// Scan that returns the bricks of tetrahedra; those not in use are left out.
-struct Homes;
+struct TetHomes;
 
-impl Scan for Homes {
+impl Scan for TetHomes {
     type Part = Vec<(u32, bool)>;
     type Output = Vec<(u32, u32)>;
 
@@ -147,7 +147,7 @@ fn fill<P: Pages>(mesh: &mut Mesh<P>, field: &Field, part: Option<&Part>, bricks
     let mut unmatched = 0;
     let mut members = Members::new(part, dense(mesh.tet_ids_end())).peekable();
     while members.peek().is_some() {
-        let found = scan_parts(mesh, &some_of(&mut members), &Slots { field, part, n_vertices });
+        let found = scan_parts(mesh, &some_of(&mut members), &TetSlots { field, part, n_vertices });
         for (placed, code) in found {
             unmatched ^= code;
             for some in placed.chunk_by(|a, b| a.home.brick == b.home.brick) {
@@ -191,13 +191,13 @@ impl PlacedTet {
 }
 
 /// Scan that returns tetrahedra by their bricks, and a sum over their faces.
-struct Slots<'a, 'b> {
+struct TetSlots<'a, 'b> {
     field: &'a Field<'b>,
     part: Option<&'a Part>,
     n_vertices: u32,
 }
 
-impl Scan for Slots<'_, '_> {
+impl Scan for TetSlots<'_, '_> {
     type Part = Vec<(u32, bool)>;
     type Output = (Vec<PlacedTet>, u64);
 

@@ -80,7 +80,7 @@ pub struct Finished {
 
 /// What a brick has, or all have.
 #[derive(Default)]
-pub(super) struct Look {
+pub(super) struct BrickLook {
     to_mend: bool,
     n_vertices: u64,
     n_tets: u64,
@@ -91,8 +91,8 @@ pub(super) struct Look {
 
 impl Finished {
     /// The mesh of bricks that were looked at.
-    pub(super) fn new(bricks: Bricks, n_bricks: u32, look: Look) -> Self {
-        let Look { n_vertices, n_tets, mut strays, .. } = look;
+    pub(super) fn new(bricks: Bricks, n_bricks: u32, look: BrickLook) -> Self {
+        let BrickLook { n_vertices, n_tets, mut strays, .. } = look;
         strays.sort_unstable_by_key(|&(home, at)| (home, at.brick, at.slot));
         Self { bricks, n_bricks, n_vertices, n_tets, strays }
     }
@@ -126,7 +126,7 @@ impl Finished {
         let mut number = 0;
         let n = at_once as u64 * u64::from(self.n_bricks) / self.n_vertices.max(1);
         for batch in batches(self.n_bricks, n.max(1) as u32) {
-            let scan = Vertices { bricks: &self.bricks, frame };
+            let scan = BrickVertices { bricks: &self.bricks, frame };
             let found = scan_parts(mesh, &batch, &scan);
             let (orders, vertices): (Vec<_>, Vec<_>) = found.into_iter().unzip();
             write(&vertices.concat())?;
@@ -220,8 +220,8 @@ impl Around {
 }
 
 /// Looks at all bricks; `None` if something of them is to be mended.
-pub(super) fn look(bricks: &Bricks, n_bricks: u32) -> Option<Look> {
-    let mut all = Look::default();
+pub(super) fn look(bricks: &Bricks, n_bricks: u32) -> Option<BrickLook> {
+    let mut all = BrickLook::default();
     for batch in batches(n_bricks, BATCH) {
         check_cancelled();
         for look in map_long(&batch, |&number| look_at(bricks, number)) {
@@ -238,10 +238,10 @@ pub(super) fn look(bricks: &Bricks, n_bricks: u32) -> Option<Look> {
     Some(all)
 }
 
-fn look_at(bricks: &Bricks, number: u32) -> Look {
+fn look_at(bricks: &Bricks, number: u32) -> BrickLook {
     let brick = bricks.get(number);
     let n_vertices = brick.vertices.len() as u64;
-    let mut look = Look { to_mend: brick.to_mend, n_vertices, ..Look::default() };
+    let mut look = BrickLook { to_mend: brick.to_mend, n_vertices, ..BrickLook::default() };
     for (slot, tet) in (0u32..).zip(&brick.tets).filter(|(_, tet)| tet.is_live()) {
         look.n_tets += 1;
         look.over_constrained += u64::from(tet.required_faces().count_ones() > 1);
@@ -254,12 +254,12 @@ fn look_at(bricks: &Bricks, number: u32) -> Look {
 }
 
 /// Scan that returns the vertices of a brick in the order of their numbers, and their slots.
-struct Vertices<'a> {
+struct BrickVertices<'a> {
     bricks: &'a Bricks,
     frame: &'a HilbertFrame,
 }
 
-impl Scan for Vertices<'_> {
+impl Scan for BrickVertices<'_> {
     type Part = u32;
     type Output = (Vec<u32>, Vec<FinishedVertex>);
 
