@@ -218,7 +218,7 @@ fn by_places(points: [Point; 4], required: u8) -> [([u64; 3], bool); 4] {
     corners
 }
 
-/// What is sealed from bricks is what pages would hold, in the order of a sealed file; where something is to be mended there are pages.
+/// Bricks give the same tetrahedra as pages, sorted as in a sealed file. A mesh that is to be mended is returned in pages.
 #[test]
 fn a_mesh_in_bricks_is_that_in_pages() {
     for (words, h) in [("knot,h=0.06", 0.06), ("balls,count=20", 0.08)] {

@@ -24,7 +24,7 @@ pub(super) struct Brick {
     pub vertices: Vec<Vertex>,
     /// Tetrahedra that division has not examined yet.
     pub unexamined: u32,
-    /// Whether something in it may be left to mend.
+    /// True if it may hold a tetrahedron that is to be mended.
     pub to_mend: bool,
 }
 

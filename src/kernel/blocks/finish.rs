@@ -78,7 +78,7 @@ pub struct Finished {
     strays: Vec<(u32, Slot)>,
 }
 
-/// What a brick has, or all have.
+/// Counts of one brick, or of all.
 #[derive(Default)]
 pub(super) struct BrickLook {
     to_mend: bool,

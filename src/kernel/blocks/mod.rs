@@ -171,7 +171,7 @@ impl Saturated {
 #[derive(Clone, Copy)]
 struct How {
     mode: Mode,
-    /// Whether what no block could divide is tried again in wider regions.
+    /// True if tetrahedra that no block could divide are tried again in wider regions.
     is_final: bool,
     /// Rings of tetrahedra around a part; `None` for the whole mesh.
     rings: Option<u32>,

@@ -14,7 +14,7 @@ pub trait PlacementRule: Sync {
         true
     }
 
-    /// Whether a tetrahedron that no block could divide is tried again in wider regions.
+    /// True if this tetrahedron is tried again in wider regions when no block could divide it.
     fn needs(&self, _points: &[Point; 4], _sizes: &[f32; 4]) -> bool {
         true
     }

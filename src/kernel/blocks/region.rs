@@ -36,7 +36,7 @@ pub(super) struct Region {
     /// Per brick: its first vertex and tetrahedron; at the end how many there are.
     first_vertex: Vec<u32>,
     first_tet: Vec<u32>,
-    /// Per brick whether something in it was to be mended, and what is now, if it was looked for.
+    /// Per brick: true if it held a tetrahedron to be mended. Then the tetrahedra to be mended now; `None` if nobody looked for them.
     was_to_mend: Vec<bool>,
     pub to_mend: Option<Vec<u32>>,
     /// Faces that lead out: face, and the reference beyond as place and slot of a face.

@@ -144,7 +144,7 @@ pub fn mend<P: Pages>(mesh: &mut Mesh<P>, progress: &dyn Fn(Progress)) -> MendCo
 }
 
 /// Rounds for tetrahedra that need them, but for those listed, whose turn is another time. `tet_of` must be right, all marks down; so are
-/// they afterwards. Returns the pages too that hold bad tetrahedra still, if any do.
+/// they afterwards. Also returns the pages that may still hold bad tetrahedra.
 pub fn improve_all_but<P: Pages>(
     mesh: &mut Mesh<P>,
     others: &[u32],

@@ -3,7 +3,7 @@
 use tetdb_schema::blob::Blob;
 use tetdb_store::store::{Catalog, Step, StoreError};
 
-/// Version of the recipe. It rises with every change that alters the digest of any mesh. A store of one version cannot be
+/// Version of the recipe. It rises with every change that alters the digest of any mesh, or its ids. A store of one version cannot be
 /// continued by another.
 pub const RECIPE: u32 = 23;
 

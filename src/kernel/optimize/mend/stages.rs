@@ -87,14 +87,15 @@ pub(super) const STAGES: [Stage; 5] = [
     WORST,
 ];
 
-/// Whether a tetrahedron of these corners and required faces, bit by bit, may be mended: a mesh without such ones stays as it is.
+/// True if a tetrahedron with these corners may be mended; bit i of `required` tells that face i is required. Mending does not change a mesh
+/// that has no such tetrahedron.
 pub fn is_to_mend(points: [Point; 4], required: u8) -> bool {
     if !is_below(points, 1.0 / WORST.quality_max) {
         return false;
     }
-    let most = quality(points) / WORST.excess_max;
+    let q = quality(points);
     let floor = |i: usize| face_floor(FACES[i].map(|k| points[k]));
-    !(0..4).any(|i| required >> i & 1 != 0 && most <= floor(i))
+    !(0..4).any(|i| required >> i & 1 != 0 && q <= WORST.excess_max * floor(i))
 }
 
 impl Stage {
