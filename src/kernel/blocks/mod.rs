@@ -31,48 +31,29 @@ mod side_by_side;
 mod smooth;
 mod spawn;
 mod tasks;
+mod visits;
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use crate::mesh::anatomy::MARK;
-use crate::mesh::anatomy::mark::EXAMINED;
-use crate::mesh::{Mesh, Tet};
-use crate::optimize::{Mode, OperationCounts};
+use crate::mesh::Mesh;
+use crate::optimize::Mode;
 use brick::Bricks;
-use divide::Divider;
 pub use field::Field;
 pub use finish::{Finished, FinishedTet, FinishedVertex};
 use part::Part;
 use partition::{KdPartition, TOO_STEEP};
 pub use placement::{Everywhere, PlacementRule};
-use region::Region;
-pub use report::RefineReport;
+pub use report::{BlockReport, RefineReport};
 use scaffold::COARSER;
-use smooth::Smoother;
 use tasks::Graph;
 use tetdb_base::storage::{DiskPath, Pages, StorageError, raise, spare_threads};
-
-/// The first of two visits of a block; the second smooths and improves it. Each has the margin in that place of `MARGINS`.
-const DIVIDE: usize = 0;
-
-/// Counts of one saturation in blocks.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct BlockReport {
-    /// Points tried and inserted.
-    pub refine: RefineReport,
-    /// Operations on bad tetrahedra.
-    pub operations: OperationCounts,
-}
+use visits::{DIVIDE, SMOOTH, Visitor, Visits};
 
 /// Fewest tetrahedra of the scaffold's lengths that are worth a saturation of their own.
 const COARSE_TETS: f64 = 20_000.0;
-/// Rings of bricks, each those that the bricks before refer to, around what was put off by all blocks.
-const RINGS: [u32; 4] = [1, 2, 4, 8];
 /// Rings of tetrahedra around what a partial field reaches; more if something in the middle could not be divided for want of them.
 const PART_RINGS: [u32; 3] = [3, 8, 24];
-/// No further ring is begun with so many bricks: the region would be several times that of a visit.
-const RING_BRICKS_MAX: usize = 1_024;
 
 /// Divides tetrahedra until the mesh is saturated; smooths it unless `mode` is `None`, and improves bad tetrahedra if it is `Full`.
 ///
@@ -206,12 +187,9 @@ fn saturate_at<P: Pages>(
     }
     bricks.limit(memory.bricks);
     mesh.pages_mut().use_at_most(memory.pages);
-    let mut graph = Graph::new(&partition, if mode == Mode::None { 1 } else { 2 });
-    if memory.bricks < usize::MAX {
-        graph.go_along_the_tree();
-    }
-    let visits = Visits {
-        partition: &partition,
+    let blocks = 0..partition.blocks.len();
+    let mut visits = Visits {
+        partition,
         field,
         mode,
         bricks,
@@ -220,24 +198,30 @@ fn saturate_at<P: Pages>(
             ..BlockReport::default()
         }),
         inserted: AtomicU64::new(scaffold),
-        left: partition.blocks.iter().map(|_| AtomicBool::new(false)).collect(),
+        left: blocks.map(|_| AtomicBool::new(false)).collect(),
         unexamined: (0..n_bricks).map(|_| AtomicU32::new(0)).collect(),
     };
-    let mut told = || progress(visits.inserted.load(Ordering::Relaxed));
-    let visit = |visitor: &mut Visitor, task| {
-        let (phase, block) = graph.visit(task);
-        visits.visit(visitor, phase, block, false);
+    let mut run = |visits: &Visits, phases, is_last: bool| {
+        let mut graph = Graph::new(&visits.partition, phases);
+        if memory.bricks < usize::MAX {
+            graph.go_along_the_tree();
+        }
+        let visit = |visitor: &mut Visitor, task| {
+            let (phase, block) = graph.visit(task);
+            if !is_last || visits.is_left(block) {
+                visits.visit(visitor, phase, block, is_last);
+            }
+        };
+        let mut told = || progress(visits.inserted.load(Ordering::Relaxed));
+        graph.run(memory.threads, &Visitor::new, &visit, &mut told);
     };
-    graph.run(memory.threads, &Visitor::new, &visit, &mut told);
+    let is_smoothed = mode != Mode::None;
+    run(&visits, DIVIDE..if is_smoothed { SMOOTH + 1 } else { SMOOTH }, false);
     // Shorter lengths divide what coarser ones leave.
     let unexamined = if is_final { visits.finish_rest() } else { 0 };
-    if mode != Mode::None && visits.left.iter().any(|left| left.load(Ordering::Relaxed)) {
-        let visit = |visitor: &mut Visitor, task| match graph.visit(task) {
-            (DIVIDE, _) => {}
-            (_, block) if !visits.left[block].load(Ordering::Relaxed) => {}
-            (phase, block) => visits.visit(visitor, phase, block, true),
-        };
-        graph.run(memory.threads, &Visitor::new, &visit, &mut told);
+    if is_smoothed && visits.is_any_left() {
+        visits.narrow();
+        run(&visits, SMOOTH..SMOOTH + 1, true);
     }
     let mut report = visits.report.into_inner().unwrap_or_else(PoisonError::into_inner);
     report.refine.unexamined = unexamined;
@@ -266,169 +250,6 @@ fn saturate_coarser<P: Pages>(mesh: &mut Mesh<P>, field: &Field, dir: &DiskPath)
         mesh.set_size(v, (field.h)(p) as f32);
     }
     made.refine.inserted
-}
-
-/// All that visits share.
-struct Visits<'a, 'b> {
-    partition: &'a KdPartition,
-    field: &'a Field<'b>,
-    mode: Mode,
-    bricks: Bricks,
-    report: Mutex<BlockReport>,
-    inserted: AtomicU64,
-    /// Blocks whose second visit waits until all is divided.
-    left: Vec<AtomicBool>,
-    /// [`brick::Brick::unexamined`] of each brick since its last visit: bricks need not be in memory to be asked.
-    unexamined: Vec<AtomicU32>,
-}
-
-/// Scratch of a thread.
-struct Visitor {
-    region: Region,
-    divider: Divider,
-    smoother: Smoother,
-}
-
-impl Visitor {
-    fn new() -> Self {
-        Self { region: Region::default(), divider: Divider::new(), smoother: Smoother::new() }
-    }
-}
-
-impl Visits<'_, '_> {
-    /// Visits a block; `is_last` tells whether nothing more will be divided.
-    fn visit(&self, visitor: &mut Visitor, phase: usize, id: usize, is_last: bool) {
-        let block = &self.partition.blocks[id];
-        let numbers = &block.regions[phase];
-        let is_own = |b| block.bricks.contains(&b);
-        self.within(visitor, numbers, is_own, |visitor, is_own, own| {
-            let color = |b: u32| self.partition.blocks[self.partition.owner(b) as usize].color;
-            let is_left = |b| self.left[self.partition.owner(b) as usize].load(Ordering::Relaxed);
-            // What a block could not do, for want of margin, those do that come later.
-            let is_before = |b| color(b) < block.color || is_last && !is_left(b);
-            let is_due: Vec<bool> =
-                (numbers.iter().zip(is_own)).map(|(&b, &is_own)| is_own || is_before(b)).collect();
-            if phase == DIVIDE {
-                self.divide(visitor, &is_due, own);
-                return;
-            }
-            if self.n_unexamined(block) > 0 {
-                self.divide(visitor, is_own, own);
-            }
-            // Flips would take tetrahedra that wait for a wider region for divided ones.
-            if !is_last && visitor.region.mesh.has_unexamined() {
-                self.left[id].store(true, Ordering::Relaxed);
-                return;
-            }
-            visitor.smoother.smooth(&mut visitor.region, is_own);
-            if self.mode == Mode::Full {
-                let counts = improve::improve(&mut visitor.region, self.partition, &is_due, own);
-                self.report.lock().unwrap_or_else(PoisonError::into_inner).operations.add(&counts);
-            }
-        });
-    }
-
-    /// Runs `work` on the arrays of some bricks. Its arguments say which bricks are the block's own, and where the first of these is in the list.
-    fn within(
-        &self,
-        visitor: &mut Visitor,
-        numbers: &[u32],
-        is_own: impl Fn(u32) -> bool,
-        work: impl FnOnce(&mut Visitor, &[bool], u32),
-    ) {
-        let bricks = self.bricks.get_all(numbers);
-        visitor.region.check_out(numbers, bricks, &mut |n| self.bricks.get(n));
-        let is_own: Vec<bool> = numbers.iter().map(|&b| is_own(b)).collect();
-        let own = is_own.iter().position(|&own| own).expect("its own bricks are among them") as u32;
-        work(visitor, &is_own, own);
-        debug_assert!(visitor.region.mesh.is_sound());
-        let made = visitor.region.check_in(own);
-        for (&number, brick) in numbers.iter().zip(&made) {
-            self.unexamined[number as usize].store(brick.unexamined, Ordering::Relaxed);
-        }
-        self.bricks.put_all(numbers.iter().copied().zip(made));
-    }
-
-    /// Divides what no block could, in wider and wider regions. There is little of it, if any; returns how many tetrahedra are left.
-    ///
-    /// A point changes connected tetrahedra alone, so regions are grown from brick to brick. Margins in lengths would take the whole of a scan:
-    /// where lengths grow from a fine surface inwards, much lies within a few of the lengths inside.
-    fn finish_rest(&self) -> u64 {
-        let mut visitor = Visitor::new();
-        for rings in RINGS {
-            for block in &self.partition.blocks {
-                let left: Vec<u32> =
-                    block.bricks.clone().filter(|&b| self.n_needed(b) > 0).collect();
-                if left.is_empty() {
-                    continue;
-                }
-                let is_left = |b: u32| left.binary_search(&b).is_ok();
-                let numbers = self.rings_around(&left, rings);
-                self.within(&mut visitor, &numbers, is_left, |visitor, is_own, own| {
-                    let before = visitor.region.mesh.vertices.len() as u32;
-                    self.divide(visitor, is_own, own);
-                    for brick in visitor.region.bricks_around(before) {
-                        let owner = self.partition.owner(brick) as usize;
-                        self.left[owner].store(true, Ordering::Relaxed);
-                    }
-                });
-            }
-        }
-        (0..self.partition.n_bricks() as u32).map(|b| self.n_needed(b)).sum()
-    }
-
-    /// Tetrahedra of a brick that are not examined, and that the field's place needs to be.
-    fn n_needed(&self, number: u32) -> u64 {
-        let n = u64::from(self.unexamined_in(number));
-        if n == 0 || !self.field.place.is_partial() {
-            return n;
-        }
-        let brick = self.bricks.get(number);
-        let is_needed = |tet: &&Tet| {
-            let corners = tet.vertices().map(|v| {
-                let at = brick.resolve(v);
-                self.bricks.get(at.brick).vertices[at.slot as usize]
-            });
-            self.field.place.needs(&corners.map(|v| v.point), &corners.map(|v| v.h()))
-        };
-        let waits = |tet: &&Tet| tet.is_live() && tet.node[EXAMINED] & MARK == 0;
-        brick.tets.iter().filter(waits).filter(is_needed).count() as u64
-    }
-
-    /// These bricks and those around them, ascending.
-    fn rings_around(&self, bricks: &[u32], rings: u32) -> Vec<u32> {
-        let mut all = bricks.to_vec();
-        let mut last = all.clone();
-        for _ in 0..rings {
-            if all.len() >= RING_BRICKS_MAX {
-                break;
-            }
-            let mut next: Vec<u32> =
-                last.iter().flat_map(|&b| self.bricks.get(b).near.clone()).collect();
-            next.sort_unstable();
-            next.dedup();
-            next.retain(|b| all.binary_search(b).is_err());
-            all.extend_from_slice(&next);
-            all.sort_unstable();
-            last = next;
-        }
-        all
-    }
-
-    fn n_unexamined(&self, block: &partition::Block) -> u64 {
-        block.bricks.clone().map(|b| u64::from(self.unexamined_in(b))).sum()
-    }
-
-    fn unexamined_in(&self, brick: u32) -> u32 {
-        self.unexamined[brick as usize].load(Ordering::Relaxed)
-    }
-
-    fn divide(&self, visitor: &mut Visitor, is_due: &[bool], own: u32) {
-        let Visitor { region, divider, .. } = visitor;
-        let report = divider.divide(region, self.partition, self.field, is_due, own);
-        self.inserted.fetch_add(report.inserted, Ordering::Relaxed);
-        self.report.lock().unwrap_or_else(PoisonError::into_inner).refine.add(&report);
-    }
 }
 
 /// Bytes of memory by use, and threads.

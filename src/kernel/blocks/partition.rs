@@ -117,8 +117,18 @@ impl KdPartition {
             }
             partition.find_conflicts(kind);
         }
-        partition.color();
+        partition.color(0);
         partition
+    }
+
+    /// Narrows the regions for the margin in that place of [`MARGINS`] to what each block needs of them. Blocks that conflict no more may
+    /// have the same color.
+    pub fn narrow(&mut self, kind: usize, needed: Vec<Vec<u32>>) {
+        for (block, needed) in self.blocks.iter_mut().zip(needed) {
+            block.regions[kind].retain(|b| needed.binary_search(b).is_ok());
+        }
+        self.find_conflicts(kind);
+        self.color(kind);
     }
 
     pub fn n_bricks(&self) -> usize {
@@ -282,8 +292,8 @@ impl KdPartition {
         }
     }
 
-    /// Colors the blocks greedily in many orders; the coloring with the shortest chain of tasks counts.
-    fn color(&mut self) {
+    /// Colors the blocks by their conflicts of a kind, greedily in many orders; the coloring with the shortest chain of tasks counts.
+    fn color(&mut self, kind: usize) {
         let n = self.blocks.len();
         let mean = self.blocks.iter().map(|b| b.load).sum::<f64>() / n as f64;
         // Part of a task's time does not depend on its load.
@@ -301,16 +311,16 @@ impl KdPartition {
             let mut keyed: Vec<_> = (0..n)
                 .map(|b| {
                     random = mix(random + 1);
-                    let degree = self.blocks[b].conflicts[0].len();
+                    let degree = self.blocks[b].conflicts[kind].len();
                     // Every other order takes blocks with many conflicts first.
                     let first = if turn % 2 == 0 { usize::MAX - degree / 4 } else { 0 };
                     (first, random, b)
                 })
                 .collect();
             keyed.sort_unstable();
-            self.greedy(keyed.into_iter().map(|k| k.2))
+            self.greedy(kind, keyed.into_iter().map(|k| k.2))
         };
-        let chains = map_long(&turns, |turn| self.longest_chain(&colors(turn), &times));
+        let chains = map_long(&turns, |turn| self.longest_chain(kind, &colors(turn), &times));
         let best = turns.iter().zip(chains).min_by(|a, b| a.1.total_cmp(&b.1));
         let best = colors(best.expect("several orders").0);
         for (block, color) in self.blocks.iter_mut().zip(best) {
@@ -318,12 +328,12 @@ impl KdPartition {
         }
     }
 
-    fn greedy(&self, order: impl Iterator<Item = usize>) -> Vec<u32> {
+    fn greedy(&self, kind: usize, order: impl Iterator<Item = usize>) -> Vec<u32> {
         let mut colors = vec![u32::MAX; self.blocks.len()];
         let mut used = Vec::new();
         for b in order {
             used.clear();
-            let conflicts = self.blocks[b].conflicts[0].iter();
+            let conflicts = self.blocks[b].conflicts[kind].iter();
             used.extend(conflicts.map(|&c| colors[c as usize]).filter(|&c| c != u32::MAX));
             used.sort_unstable();
             used.dedup();
@@ -333,12 +343,12 @@ impl KdPartition {
         colors
     }
 
-    fn longest_chain(&self, colors: &[u32], times: &[f64]) -> f64 {
+    fn longest_chain(&self, kind: usize, colors: &[u32], times: &[f64]) -> f64 {
         let mut order: Vec<usize> = (0..colors.len()).collect();
         order.sort_by_key(|&b| colors[b]);
         let mut ends = vec![0.0f64; colors.len()];
         for b in order {
-            let before = self.blocks[b].conflicts[0].iter().map(|&c| c as usize);
+            let before = self.blocks[b].conflicts[kind].iter().map(|&c| c as usize);
             let start = before.filter(|&c| colors[c] < colors[b]).map(|c| ends[c]);
             ends[b] = start.fold(0.0, f64::max) + times[b];
         }

@@ -1,5 +1,16 @@
 //! Counts of what saturation tried and did.
 
+use crate::optimize::OperationCounts;
+
+/// Counts of one saturation in blocks.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BlockReport {
+    /// Points tried and inserted.
+    pub refine: RefineReport,
+    /// Operations on bad tetrahedra.
+    pub operations: OperationCounts,
+}
+
 /// Counts of one saturation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RefineReport {

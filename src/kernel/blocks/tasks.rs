@@ -5,15 +5,17 @@
 //! and the mesh is the same for any number of threads.
 
 use std::collections::BinaryHeap;
+use std::ops::Range;
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Instant;
 
 use super::partition::KdPartition;
 use tetdb_base::storage::{check_cancelled, in_place_scope, shared_tasks};
 
-/// The graph of all visits; task `phase * n + block` for `n` blocks.
+/// The graph of all visits in some phases; with `n` blocks, those in the k-th of them are tasks `k * n` and on.
 pub(super) struct Graph {
     n_blocks: usize,
+    first_phase: usize,
     /// Tasks that wait for each task.
     followers: Vec<Vec<u32>>,
     /// Tasks that each task waits for.
@@ -24,19 +26,20 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    /// `n_phases` one after the other, with the margins in that order.
-    pub fn new(partition: &KdPartition, n_phases: usize) -> Self {
+    /// Phases one after the other, each with the margin in its place of `MARGINS`.
+    pub fn new(partition: &KdPartition, phases: Range<usize>) -> Self {
         let n = partition.blocks.len();
+        let n_phases = phases.len();
         let mut followers = vec![Vec::new(); n * n_phases];
         let mut n_before = vec![0; n * n_phases];
         let mut add = |before: usize, after: usize| {
             followers[before].push(after as u32);
             n_before[after] += 1;
         };
-        for phase in 0..n_phases {
+        for (phase, margin) in phases.clone().enumerate() {
             for (b, block) in partition.blocks.iter().enumerate() {
                 let color = |c: u32| partition.blocks[c as usize].color;
-                for &c in &block.conflicts[phase] {
+                for &c in &block.conflicts[margin] {
                     if color(c) < block.color {
                         add(phase * n + c as usize, phase * n + b);
                     }
@@ -44,13 +47,14 @@ impl Graph {
                 if phase > 0 {
                     add((phase - 1) * n + b, phase * n + b);
                     // The margin before was the wider one.
-                    for &c in &block.conflicts[phase - 1] {
+                    for &c in &block.conflicts[margin - 1] {
                         add((phase - 1) * n + c as usize, phase * n + b);
                     }
                 }
             }
         }
-        let mut graph = Self { n_blocks: n, followers, n_before, urgency: Vec::new() };
+        let (first_phase, urgency) = (phases.start, Vec::new());
+        let mut graph = Self { n_blocks: n, first_phase, followers, n_before, urgency };
         graph.find_urgency(partition, n_phases);
         graph
     }
@@ -84,7 +88,7 @@ impl Graph {
 
     /// Phase and block of a task.
     pub fn visit(&self, task: usize) -> (usize, usize) {
-        (task / self.n_blocks, task % self.n_blocks)
+        (self.first_phase + task / self.n_blocks, task % self.n_blocks)
     }
 
     /// Does all tasks on some threads. Each thread has a scratch of its own, made by `scratch`. A panic, or a request to stop, ends all of them. `told`
