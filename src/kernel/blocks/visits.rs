@@ -16,9 +16,9 @@ use crate::mesh::anatomy::MARK;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::optimize::Mode;
 
-/// The two visits of a block. Each has the margin in that place of `MARGINS`.
+/// The first visit of a block, which divides it. Each visit has the margin in that place of `MARGINS`.
 pub(super) const DIVIDE: usize = 0;
-/// Smooths it and improves it.
+/// The second, which smooths and improves it.
 pub(super) const SMOOTH: usize = 1;
 
 /// Rings of bricks, each those that the bricks before refer to, around what was put off by all blocks.
