@@ -32,6 +32,12 @@ const BINS: usize = 1024;
 /// Orders in which the blocks are colored; the best counts.
 const ORDERS: usize = 200;
 
+/// Tetrahedra of each block of a mesh of so many.
+pub fn block_tets(total: f64) -> f64 {
+    let block = BLOCK_TETS.min((total / BLOCKS_MIN).max(BLOCK_TETS_MIN));
+    block.max(total / BLOCKS_MAX)
+}
+
 /// A branch of the tree.
 #[derive(Clone, Copy, Debug)]
 struct Branch {
@@ -81,8 +87,7 @@ impl KdPartition {
     /// Divides samples of the load, whose weights are tetrahedra, in `bounds`. `h` is the wanted length at a point.
     pub fn new(mut samples: Vec<Sample>, bounds: Aabb, h: &(dyn Fn(Point) -> f64 + Sync)) -> Self {
         let total: f64 = samples.iter().map(|s| f64::from(s.weight)).sum();
-        let block = BLOCK_TETS.min((total / BLOCKS_MIN).max(BLOCK_TETS_MIN));
-        let block = block.max(total / BLOCKS_MAX);
+        let block = block_tets(total);
         let brick = (block / BRICKS).max(BRICK_TETS_MIN);
         let mut partition = Self {
             branches: Vec::new(),
@@ -396,4 +401,67 @@ fn partition_by(samples: &mut [Sample], passes: impl Fn(&Sample) -> bool) -> usi
         }
     }
     i
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tetdb_base::storage::{CancelToken, RunContext};
+
+    /// A grid of 20³ samples of a load that grows towards one corner, a hundred thousand tetrahedra in all.
+    fn partition() -> KdPartition {
+        let samples = (0..8000u32).map(|k| {
+            let at = [k % 20, k / 20 % 20, k / 400].map(|i| (f64::from(i) + 0.5) / 20.0);
+            Sample { at: Point::from_array(at), weight: (25.0 * (1.5 - at[0])) as f32 }
+        });
+        let h = |p: Point| 0.01 + 0.05 * p.x;
+        KdPartition::new(samples.collect(), Aabb::around([Point::ZERO, Point::ONE]), &h)
+    }
+
+    /// No two blocks that may be visited at the same time have a brick in common; returns the number of colors.
+    fn colors(partition: &KdPartition, kind: usize) -> usize {
+        let mut of_color = std::collections::BTreeMap::<u32, Vec<u32>>::new();
+        for block in &partition.blocks {
+            assert!(block.bricks.clone().all(|b| block.regions[kind].binary_search(&b).is_ok()));
+            of_color.entry(block.color).or_default().extend(&block.regions[kind]);
+        }
+        for bricks in of_color.values_mut() {
+            let n = bricks.len();
+            bricks.sort_unstable();
+            bricks.dedup();
+            assert_eq!(bricks.len(), n, "blocks of one color share a brick");
+        }
+        of_color.len()
+    }
+
+    #[test]
+    fn blocks_of_one_color_share_no_brick() {
+        let context = RunContext::new(2, CancelToken::new());
+        context.enter(|| {
+            let mut partition = partition();
+            assert!(partition.blocks.len() > 10, "{} blocks", partition.blocks.len());
+            let wide = colors(&partition, 0);
+            let next_to =
+                |block: &Block| partition.around(&block.bounds, |b| block.bricks.contains(&b), 0.0);
+            let needed = partition.blocks.iter().map(next_to).collect();
+            let before: usize = partition.blocks.iter().map(|b| b.regions[1].len()).sum();
+            partition.narrow(1, needed);
+            assert!(partition.blocks.iter().map(|b| b.regions[1].len()).sum::<usize>() < before);
+            let narrow = colors(&partition, 1);
+            assert!((2..wide).contains(&narrow), "{narrow} colors, {wide} of the wide regions");
+        });
+    }
+
+    #[test]
+    fn each_place_is_in_one_brick() {
+        let partition = RunContext::new(1, CancelToken::new()).enter(partition);
+        for k in 0..1000u32 {
+            let p =
+                Point::from_array([7, 31, 113].map(|prime| f64::from(k * prime % 1000) / 1000.0));
+            let brick = partition.find(p);
+            let bounds = partition.bricks[brick as usize].0;
+            assert!(bounds.low.cmple(p).all() && p.cmple(bounds.high).all());
+            assert!(partition.blocks[partition.owner(brick) as usize].bricks.contains(&brick));
+        }
+    }
 }

@@ -17,8 +17,10 @@ pub(super) const BALL_MAX: usize = 1024;
 const STEPS: u32 = 60;
 /// Places tried on the way back to where a vertex is, each half as far.
 const HALVINGS: u32 = 12;
-/// A move for the sum must at least raise the product of a ball by this much in powers of two: less is worth no sweep.
+/// A move for the product must at least raise it by this much in powers of two, and by the other for each tetrahedron of the ball: less is worth no sweep.
+/// In a fan of thousands each sweep finds some powers, of which no tetrahedron has anything, and its neighbors are searched in vain again.
 const GAIN_MIN: f64 = 0.1;
+const GAIN_EACH: f64 = 0.003;
 
 /// A tetrahedron below this value is flat but for rounding.
 pub(super) const FLAT: f64 = 1e-4;
@@ -89,7 +91,8 @@ impl Mover {
         };
         let found = climb.run(value, |p, _| self.star.product(p, floor));
         let (p, value) = found.unwrap_or((lifted, value));
-        let is_better = value > before + GAIN_MIN;
+        let gain_min = GAIN_MIN.max(GAIN_EACH * self.star.sides.len() as f64);
+        let is_better = value > before + gain_min;
         if is_better {
             mesh.set_point(v, p);
         }
