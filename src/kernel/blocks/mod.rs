@@ -42,6 +42,7 @@ use brick::Bricks;
 pub use field::Field;
 pub use finish::{Finished, FinishedTet, FinishedVertex};
 use part::Part;
+pub use partition::block_tets;
 use partition::{KdPartition, TOO_STEEP};
 pub use placement::{Everywhere, PlacementRule};
 pub use report::{BlockReport, RefineReport};

@@ -86,7 +86,7 @@ const BEYOND_CAP: f64 = 18e6;
 
 /// CPU seconds per tetrahedron and per triangle on one core of an EPYC at 2.6 GHz. Where needles slow the recovery, it may take
 /// ten times as long.
-const SECONDS_TET: f64 = 1.0 / 240e3;
+pub(super) const SECONDS_TET: f64 = 1.0 / 240e3;
 pub(super) const SECONDS_TRIANGLE: f64 = 7.5e-6;
 /// CPU seconds of verification per tetrahedron.
 pub(super) const SECONDS_VERIFY: f64 = 0.6e-6;
@@ -358,14 +358,6 @@ impl Estimate {
             cap += 1 << 20;
         }
         cap
-    }
-
-    /// Wall seconds on `threads` threads, with verification. The estimate divides only the meshing of sub-domains among threads.
-    pub fn seconds(&self, threads: usize) -> f64 {
-        let side_by_side = f64::from(self.subdomains).min(threads.max(1) as f64);
-        SECONDS_TRIANGLE * self.triangles as f64
-            + SECONDS_TET * self.tets() / side_by_side
-            + SECONDS_VERIFY * self.tets()
     }
 
     /// Number of sub-domains meshed at once.

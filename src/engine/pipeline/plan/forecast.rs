@@ -1,9 +1,10 @@
-//! Forecast of the wall time of many workers on many machines, from predicted counts alone.
+//! Forecast of the wall time of threads, and of many workers on many machines, from predicted counts alone.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::estimate::{Estimate, SECONDS_TRIANGLE, SECONDS_VERIFY};
+use super::estimate::{Estimate, SECONDS_TET, SECONDS_TRIANGLE, SECONDS_VERIFY};
+use tetdb_kernel::blocks::block_tets;
 
 /// CPU seconds of a cut: per triangle of the subtree's surface, and per tetrahedron near the cutting plane. The number of the
 /// latter is taken as the number of all tetrahedra of the subtree to the power 2/3.
@@ -14,6 +15,17 @@ const CUT_TRIANGLE: f64 = 1.4e-6;
 const CUT_PLANE: f64 = 6.5e-5;
 /// CPU seconds per tetrahedron of a sub-domain; measured on the same two meshes: 2.65 and 2.82 microseconds.
 const SUBDOMAIN_TET: f64 = 2.75e-6;
+
+/// Shares of the CPU seconds of a triangle and of a tetrahedron that one thread has alone: boundary recovery; scaffold, numbering, sealing.
+/// Share of those of a tetrahedron that visits of blocks take. The rest has no order.
+///
+/// From the journals of ellipsoids of 3.0 and 4.4 million with one thread. With 1, 2, 4, 8 and 16 threads on 16 cores the larger one took
+/// 17.3, 11.5, 7.1, 5.4 and 4.9 s; the forecast is 20.0, 12.3, 8.5, 6.5 and 5.6 without verification.
+const TRIANGLE_ALONE: f64 = 0.43;
+const TET_ALONE: f64 = 0.10;
+const TET_VISITS: f64 = 0.77;
+/// The longest chain of visits is as long as those of so many blocks, whatever the mesh: it follows from the number of colors.
+const CHAIN_BLOCKS: f64 = 18.0;
 
 /// Wall seconds with any number of workers of one thread each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,20 +46,50 @@ impl Forecast {
 }
 
 impl Estimate {
+    /// Predicted wall time with verification. Unit: seconds.
+    ///
+    /// Threads that are more than the sub-domains work together in each. Of visits, those that are not in the longest chain are shared: any order
+    /// of them takes no longer.
+    pub fn seconds(&self, threads: usize) -> f64 {
+        let (threads, n) = (threads.max(1) as f64, f64::from(self.subdomains));
+        let at_once = n.min(threads);
+        surface_seconds(self.triangles as f64, threads)
+            + self.cuts_seconds(threads as u32)
+            + subdomain_seconds(self.tets() / n, threads / at_once) * (n / at_once).ceil()
+            + SECONDS_VERIFY * self.tets() / threads
+    }
+
+    /// Wall seconds of all cuts.
+    fn cuts_seconds(&self, workers: u32) -> f64 {
+        tree_seconds(self.subdomains, workers, |count| {
+            let share = f64::from(count) / f64::from(self.subdomains);
+            let plane = (share * self.tets()).powf(2.0 / 3.0);
+            CUT_TRIANGLE * share * self.triangles as f64 + CUT_PLANE * plane
+        })
+    }
+
     /// Forecasts the wall time of `workers` workers on any number of machines; 0 counts as 1.
     pub fn forecast(&self, workers: u32) -> Forecast {
         let (workers, n) = (workers.max(1), self.subdomains);
         let per_subdomain = SUBDOMAIN_TET * self.tets() / f64::from(n);
         Forecast {
             serial_s: SECONDS_TRIANGLE * self.triangles as f64 + SECONDS_VERIFY * self.tets(),
-            cuts_s: tree_seconds(n, workers, |count| {
-                let share = f64::from(count) / f64::from(n);
-                let plane = (share * self.tets()).powf(2.0 / 3.0);
-                CUT_TRIANGLE * share * self.triangles as f64 + CUT_PLANE * plane
-            }),
+            cuts_s: self.cuts_seconds(workers),
             subdomains_s: per_subdomain * f64::from(n.div_ceil(workers)),
         }
     }
+}
+
+/// Wall seconds of all that is done with triangles alone.
+fn surface_seconds(triangles: f64, threads: f64) -> f64 {
+    SECONDS_TRIANGLE * triangles * (TRIANGLE_ALONE + (1.0 - TRIANGLE_ALONE) / threads)
+}
+
+/// Wall seconds of a sub-domain of so many tetrahedra.
+fn subdomain_seconds(tets: f64, threads: f64) -> f64 {
+    let chain = (CHAIN_BLOCKS * block_tets(tets) / tets.max(1.0)).min(1.0);
+    let alone = TET_ALONE + TET_VISITS * chain;
+    SECONDS_TET * tets * (alone + (1.0 - alone) / threads)
 }
 
 /// Wall seconds of all cuts of a mesh with `n` sub-domains. `seconds` gives the time of a cut from the number of sub-domains
@@ -75,6 +117,22 @@ fn tree_seconds(n: u32, workers: u32, seconds: impl Fn(u32) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn threads_are_forecast_as_they_were_measured() {
+        let seconds = |tets, threads| {
+            surface_seconds(0.046 * tets, threads) + subdomain_seconds(tets, threads)
+        };
+        // Ellipsoids on 16 cores.
+        let one = seconds(4.4e6, 1.0);
+        for (threads, measured) in [(2.0, 11.5), (4.0, 7.1), (8.0, 5.4), (16.0, 4.9)] {
+            let ratio = seconds(4.4e6, threads) / one / (measured / 17.3);
+            assert!((ratio - 1.0).abs() < 0.1, "{threads} threads: {ratio} of what was measured");
+        }
+        // A mesh of few blocks is done block by block, a large one by all.
+        assert!(seconds(2e4, 1.0) < 1.5 * seconds(2e4, 16.0));
+        assert!(seconds(2e8, 1.0) > 5.0 * seconds(2e8, 16.0));
+    }
 
     #[test]
     fn cuts_wait_for_those_above_them_and_for_free_workers() {
