@@ -32,7 +32,7 @@ const BINS: usize = 1024;
 /// Orders in which the blocks are colored; the best counts.
 const ORDERS: usize = 200;
 
-/// Tetrahedra of each block of a mesh of so many.
+/// Predicted tetrahedra of each block, in a mesh of `total` tetrahedra.
 pub fn block_tets(total: f64) -> f64 {
     let block = BLOCK_TETS.min((total / BLOCKS_MIN).max(BLOCK_TETS_MIN));
     block.max(total / BLOCKS_MAX)
@@ -408,7 +408,7 @@ mod tests {
     use super::*;
     use tetdb_base::storage::{CancelToken, RunContext};
 
-    /// A grid of 20³ samples of a load that grows towards one corner, a hundred thousand tetrahedra in all.
+    /// A grid of 20³ samples whose load falls along x, two hundred thousand tetrahedra in all.
     fn partition() -> KdPartition {
         let samples = (0..8000u32).map(|k| {
             let at = [k % 20, k / 20 % 20, k / 400].map(|i| (f64::from(i) + 0.5) / 20.0);

@@ -361,7 +361,7 @@ impl Estimate {
     }
 
     /// Number of sub-domains meshed at once.
-    fn at_once(&self, threads: usize) -> f64 {
+    pub(super) fn at_once(&self, threads: usize) -> f64 {
         f64::from(self.subdomains).min(threads.max(1) as f64)
     }
 

@@ -20,7 +20,8 @@ const SUBDOMAIN_TET: f64 = 2.75e-6;
 /// Share of those of a tetrahedron that visits of blocks take. The rest has no order.
 ///
 /// From the journals of ellipsoids of 3.0 and 4.4 million with one thread. With 1, 2, 4, 8 and 16 threads on 16 cores the larger one took
-/// 17.3, 11.5, 7.1, 5.4 and 4.9 s; the forecast is 20.0, 12.3, 8.5, 6.5 and 5.6 without verification.
+/// 17.3, 11.5, 7.1, 5.4 and 4.9 s; the forecast is 20.0, 12.3, 8.5, 6.5 and 5.6 without verification. Of no other kind of surface
+/// was the curve measured.
 const TRIANGLE_ALONE: f64 = 0.43;
 const TET_ALONE: f64 = 0.10;
 const TET_VISITS: f64 = 0.77;
@@ -48,14 +49,14 @@ impl Forecast {
 impl Estimate {
     /// Predicted wall time with verification. Unit: seconds.
     ///
-    /// Threads that are more than the sub-domains work together in each. Of visits, those that are not in the longest chain are shared: any order
-    /// of them takes no longer.
+    /// Of the visits of blocks, the longest chain counts in full and the rest is shared: a list schedule takes no longer.
     pub fn seconds(&self, threads: usize) -> f64 {
-        let (threads, n) = (threads.max(1) as f64, f64::from(self.subdomains));
-        let at_once = n.min(threads);
+        let (at_once, n) = (self.at_once(threads), f64::from(self.subdomains));
+        let threads = threads.max(1) as f64;
+        // A thread without a sub-domain of its own helps with those of others.
         surface_seconds(self.triangles as f64, threads)
             + self.cuts_seconds(threads as u32)
-            + subdomain_seconds(self.tets() / n, threads / at_once) * (n / at_once).ceil()
+            + subdomain_seconds(self.tets() / n, threads / at_once) * n / at_once
             + SECONDS_VERIFY * self.tets() / threads
     }
 

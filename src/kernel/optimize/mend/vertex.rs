@@ -17,9 +17,10 @@ pub(super) const BALL_MAX: usize = 1024;
 const STEPS: u32 = 60;
 /// Places tried on the way back to where a vertex is, each half as far.
 const HALVINGS: u32 = 12;
-/// A move for the product must at least raise it by this much in powers of two, and by the other for each tetrahedron of the ball: less is worth no sweep.
-/// In a fan of thousands each sweep finds some powers, of which no tetrahedron has anything, and its neighbors are searched in vain again.
+/// A move for the product must raise it by at least this much, in powers of two.
 const GAIN_MIN: f64 = 0.1;
+/// It must also raise it by this much for each tetrahedron of the ball. A ball of thousands can always gain a few powers that no single
+/// tetrahedron notices, and after each such move the neighbors were searched again for nothing.
 const GAIN_EACH: f64 = 0.003;
 
 /// A tetrahedron below this value is flat but for rounding.
