@@ -5,3 +5,4 @@ mod flood;
 mod oracle;
 mod real;
 mod shapes;
+mod tidy;

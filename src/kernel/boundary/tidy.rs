@@ -29,7 +29,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
         mesh.tet_of(v) != tetdb_schema::page::NONE
             && mesh.vertex_attribute(v).0 == VertexTag::Steiner
     };
-    let mut left: Vec<u32> = (0..mesh.n_vertices()).filter(|&v| steiner(mesh, v)).collect();
+    let mut left: Vec<u32> = mesh.vertex_ids().filter(|&v| steiner(mesh, v)).collect();
     let none = IdSet::default();
     // Only points next to a change are visited again.
     let mut beside: IdSet<u32> = left.iter().copied().collect();

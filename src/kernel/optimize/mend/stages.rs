@@ -119,7 +119,8 @@ impl Stage {
             Goal::Worst => &mut stage.quality_max,
             Goal::WorstExcess => &mut stage.excess_max,
         };
-        *limit = limit.max(WORST_SHARE * worst);
+        // Where rounding makes a determinant zero, the badness is infinite.
+        *limit = limit.max(WORST_SHARE * worst.min(f64::MAX));
         if self.goal == Goal::Worst {
             *limit = limit.max(forced);
         }
