@@ -281,7 +281,10 @@ fn may_live(path: &Path) -> bool {
     let Some(holder) = Holder::read(path) else {
         return true;
     };
-    !is_process_gone(&holder.host, holder.process)
+    // Another process may have its number by now.
+    let is_another =
+        holder.host == host_name() && holder.began != 0 && began(holder.process) != holder.began;
+    !is_another && !is_process_gone(&holder.host, holder.process)
 }
 
 /// The process that a lock file names, in words.
@@ -354,6 +357,11 @@ mod tests {
         let held = FileLock::acquire_with(&path, without_locks).expect("its holder is gone");
         assert!(held.is_by_name());
         drop(held);
+        // Another process has its number.
+        left.process = std::process::id();
+        left.began += 1;
+        fs::write(&path, serde_json::to_string(&left)?)?;
+        drop(FileLock::acquire_with(&path, without_locks).expect("its holder is gone too"));
         left.host += ".elsewhere";
         fs::write(&path, serde_json::to_string(&left)?)?;
         assert!(is_held(FileLock::acquire_with(&path, without_locks)));

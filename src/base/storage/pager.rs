@@ -50,6 +50,8 @@ pub struct Pager {
     /// `frames_max * SLOTS` slots, zero until a frame is taken: memory that is not touched is not there.
     frames: Vec<Slot>,
     frames_max: usize,
+    /// The most `frames_max` may be, but for a while.
+    frames_limit: usize,
     free: Vec<u32>,
     tables: [PageTable; kind::ALL.len()],
     /// Number in the file of each kind's first page; grows when pages are dropped from the front.
@@ -82,6 +84,7 @@ impl Pager {
         Self {
             frames: zeroed(frames_max * SLOTS),
             frames_max,
+            frames_limit: frames_max,
             free: Vec::new(),
             tables: Default::default(),
             first: Default::default(),

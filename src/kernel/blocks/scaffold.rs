@@ -37,18 +37,17 @@ pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
     let mut pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
     for round in 0..ROUNDS_MAX {
         check_cancelled();
-        let found = wanted(mesh, field, &pages);
-        pages.clear();
-        let key = |(t, point, h)| {
-            let mut key = order.index(point);
-            if round == 0 {
-                let random = mix(key ^ 77);
-                let level = (0..LEVELS).find(|l| random >> (3 * l) & 7 == 0).unwrap_or(LEVELS);
-                key = level << 61 | key >> 3;
+        let key = |point| {
+            let key = order.index(point);
+            if round > 0 {
+                return key;
             }
-            (key, t, point, h)
+            let random = mix(key ^ 77);
+            let level = (0..LEVELS).find(|l| random >> (3 * l) & 7 == 0).unwrap_or(LEVELS);
+            level << 61 | key >> 3
         };
-        let mut found: Vec<(u64, u32, Point, f64)> = found.into_iter().map(key).collect();
+        let mut found = wanted(mesh, field, &pages, &key);
+        pages.clear();
         found.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.cmp(&b.1)));
         let before = inserted;
         for (_, t, point, h) in found {
@@ -98,15 +97,20 @@ pub(super) fn build<P: Pages>(mesh: &mut Mesh<P>, field: &Field) -> u64 {
     inserted
 }
 
-/// A tetrahedron, its point, and the length wanted there.
-type Wanted = (u32, Point, f64);
+/// A point, behind the key of its turn and the tetrahedron that gets it, and the length wanted there.
+type Wanted = (u64, u32, Point, f64);
 
-/// The points of long tetrahedra of some pages that were not examined before, and that the field's place reaches. Effects: they are marked as
+/// The points, with their `key`, of long tetrahedra of some pages that were not examined before, and that the field's place reaches. Effects: they are marked as
 /// examined.
-fn wanted<P: Pages>(mesh: &mut Mesh<P>, field: &Field, pages: &[u32]) -> Vec<Wanted> {
+fn wanted<P: Pages>(
+    mesh: &mut Mesh<P>,
+    field: &Field,
+    pages: &[u32],
+    key: &(dyn Fn(Point) -> u64 + Sync),
+) -> Vec<Wanted> {
     let mut found = Vec::new();
     for batch in pages.chunks(BATCH) {
-        for (due, points) in scan_parts(mesh, batch, &Long(field)) {
+        for (due, points) in scan_parts(mesh, batch, &Long(field, key)) {
             due.into_iter().for_each(|t| mesh.set_mark(t, EXAMINED, true));
             found.extend(points);
         }
@@ -115,7 +119,7 @@ fn wanted<P: Pages>(mesh: &mut Mesh<P>, field: &Field, pages: &[u32]) -> Vec<Wan
 }
 
 /// Scan that returns the tetrahedra of a page that were not examined before, and the points of those that are long.
-struct Long<'a, 'b>(&'a Field<'b>);
+struct Long<'a, 'b>(&'a Field<'b>, &'a (dyn Fn(Point) -> u64 + Sync));
 
 impl Scan for Long<'_, '_> {
     type Part = u32;
@@ -126,7 +130,8 @@ impl Scan for Long<'_, '_> {
         tets_of_page(mesh, page, |mesh, t, tet| {
             if tet.node[EXAMINED] & MARK == 0 && self.0.reaches(&mesh.ends(&tet)) {
                 due.push(t);
-                points.extend(point_of(mesh, &tet, self.0).map(|(point, h)| (t, point, h)));
+                let point = point_of(mesh, &tet, self.0);
+                points.extend(point.map(|(point, h)| (self.1(point), t, point, h)));
             }
         });
         (due, points)

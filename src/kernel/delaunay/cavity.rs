@@ -137,7 +137,7 @@ impl Kernel {
                     required,
                 });
             }
-            if self.cavity.len() > CAVITY_MAX {
+            if CONSTRAINED && self.cavity.len() > CAVITY_MAX {
                 self.discard(mesh);
                 return Err(Rejected::TooLarge);
             }

@@ -10,7 +10,7 @@ impl Pager {
     pub fn limit(&mut self, bytes: u64) {
         let limit = frames_of(bytes).min(self.frames.len() / SLOTS);
         assert!(self.owners.len() <= limit, "more frames than it may use");
-        self.frames_max = limit;
+        (self.frames_max, self.frames_limit) = (limit, limit);
     }
 
     /// [`Pager::limit`], and gives a pool that was created without one a place for pages that leave memory.
@@ -31,7 +31,7 @@ impl Pager {
         if !self.files.exist() {
             return;
         }
-        let frames = frames_of(bytes).min(self.frames.len() / SLOTS);
+        let frames = frames_of(bytes).min(self.frames_limit);
         if frames < self.owners.len() {
             self.leave_memory();
         }

@@ -336,7 +336,7 @@ fn facets<P: Pages>(
 
 fn claim(vertices: [u32; 3], number: u32, at_interface: bool) -> InputFace {
     let (vertices, odd) = sorted_face(vertices);
-    InputFace { vertices, number, odd, at_interface }
+    InputFace { vertices, at_interface, number, odd }
 }
 
 fn push_facet<P: Pages>(

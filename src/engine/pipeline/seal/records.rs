@@ -30,11 +30,11 @@ sort_record! {
     pub struct InputFace {
         /// Ascending.
         pub vertices: [u32; 3],
+        /// True for an interface face, false for a facet. Both facets of a wall given from both sides come before any interface face.
+        pub at_interface: bool,
         pub number: u32,
         /// True if the ascending order is odd in the facet or interface face.
         pub odd: bool,
-        /// True for an interface face, false for a facet.
-        pub at_interface: bool,
     }
 }
 
