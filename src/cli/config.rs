@@ -155,7 +155,7 @@ fn read(text: &str) -> Result<OptionsText, Failure> {
 
 fn bad(what: String) -> Failure {
     Failure::new(Code::BadConfig, what).help(
-        "keys are those of `tetdb mesh --help`, for example hsiz = 0.1, hmax = \"2%\" or size_sphere = [[0, 0, 0, 1, 0.1]]",
+        "keys are the options of `tetdb mesh` for lengths, regions and the store, for example hsiz = 0.1, hmax = \"2%\" or size_sphere = [[0, 0, 0, 1, 0.1]]",
     )
 }
 

@@ -125,7 +125,9 @@ fn options(args: &ExportArgs, settings: &Settings) -> Result<ExportOptions, Fail
     }
     if let Some(text) = &args.region {
         let store = Store::open_with(&args.store, settings.clone())?;
-        options = options.regions(&regions(text, store.summary())?);
+        let regions = regions(text, store.summary());
+        options =
+            options.regions(&regions.map_err(|f| f.help("`tetdb info STORE` lists the regions"))?);
     }
     if let Some(Share { number, of }) = args.share {
         options = options.share(number, of);
@@ -166,6 +168,7 @@ fn rows(args: &ExportArgs) -> Result<Option<QueryArgs>, Failure> {
         args.one_partition,
         args.order != 1,
         args.read.json,
+        args.share.is_some(),
     ];
     let ([out], false) = (&args.out[..], of_meshes.contains(&true)) else {
         let message = ".csv and .jsonl are one file of rows, a tetrahedron each, and no mesh";
@@ -182,6 +185,7 @@ fn rows(args: &ExportArgs) -> Result<Option<QueryArgs>, Failure> {
         csv: to_stdout && word(out) == "csv",
         json: to_stdout && word(out) == "jsonl",
         output: (!to_stdout).then(|| out.clone()),
+        at: args.at.clone(),
         memory: args.read.memory.clone(),
         ..QueryArgs::default()
     }))

@@ -107,7 +107,7 @@ fn help_of(code: Code) -> &'static str {
         Code::Damaged => {
             "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` meshes damaged sub-domains again, `--forget` drops a damaged previous version, `tetdb version STORE drop NAME` one with a name"
         }
-        Code::Memory => "give more with --memory, or take a coarser surface",
+        Code::Memory => "give more with --memory, ask for longer edges, or take a coarser surface",
         Code::Stopped if super::signals::has_store() => {
             "`tetdb resume STORE` continues from the last finished step"
         }
@@ -186,8 +186,13 @@ fn help_of(code: Code) -> &'static str {
             "`tetdb estimate SURFACE` tells what a mesh takes; ask for longer edges (--hsiz), give more --memory, or put the store on another disk with -o"
         }
         Code::InvalidMesh => {
-            "`tetdb verify STORE --full --json` lists the places; --embed names sheets"
+            "`tetdb verify STORE --full --json` lists the places; with --against, also name sheets with --embed; after a change `tetdb resaturate STORE --undo` brings back the mesh before it"
         }
+        Code::StoreChanged => "run the command again: the answer is then of the store as it is now",
+        Code::NoTasks => {
+            "`tetdb info STORE` says how far it is; `tetdb plan STORE --tasks N` plans an unfinished store, and `tetdb gather STORE` opens the next stage"
+        }
+        Code::TaskFile => "`tetdb gather STORE` writes the orders again; then do the task again",
         _ => "check the path and its permissions",
     }
 }

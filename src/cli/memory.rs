@@ -17,8 +17,8 @@ pub fn requested(option: Option<&str>) -> Result<Option<u64>, Failure> {
     let bytes = parse(text)?;
     if bytes < MEMORY_LEAST.0 {
         let least = MEMORY_LEAST.0 >> 20;
-        let message = format!("--memory {text} is less than the {least} MiB any run needs");
-        let help = format!("give at least --memory {least}MiB");
+        let message = format!("{text} is less memory than the {least} MiB any run needs");
+        let help = format!("give at least {least}MiB");
         return Err(Failure::new(Code::Memory, message).help(help));
     }
     Ok(Some(bytes))

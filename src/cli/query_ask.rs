@@ -46,6 +46,7 @@ fn list<T: std::str::FromStr>(option: &str, text: &str, expected: &str) -> Resul
 }
 
 const RANKS: &str = "numbers such as 0,3";
+const REGIONS: &str = "numbers such as 1,3, or names the store knows";
 
 /// Builds the query of these arguments. Errors: values that make no sense; parts that the store does not have.
 pub fn query<'s>(args: &QueryArgs, store: &'s mut Store) -> Result<Query<'s>, Failure> {
@@ -116,7 +117,7 @@ pub(super) fn regions(text: &str, summary: &Summary) -> Result<Vec<u32>, Failure
         match word.parse() {
             Ok(region) => found.push(region),
             Err(_) if word.is_empty() || summary.region_names.is_empty() => {
-                return Err(bad("--region", text, RANKS));
+                return Err(bad("--region", text, REGIONS));
             }
             Err(_) => found.extend(summary.regions_called(word)?),
         }

@@ -15,7 +15,7 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
         || args.sheets.allow_open
         || args.repair.repair.is_some();
     if embeds && args.against.is_empty() {
-        let message = "what was embedded or repaired is named beside the surface alone, and --against names none";
+        let message = "--repair, --embed… and --allow-open describe the surface of --against, which is missing";
         return Err(Failure::new(Code::Usage, message)
             .help("name all files with --against and --embed…, or none: the store knows them"));
     }

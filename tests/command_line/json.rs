@@ -29,6 +29,7 @@ const RUNS: [(&str, &[&str]); 23] = [
             "check sample:broken,kind=crossings --repair=resolve --write r.off",
             "check sample:broken,kind=holes",
             "check sample:broken,kind=holes --repair=winding --write w.off",
+            "check sample:broken,kind=soup --repair=wrap --write s.off",
             "check holes.off --repair --weld 1e-3 --write fixed.off",
         ],
     ),

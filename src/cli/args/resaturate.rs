@@ -10,8 +10,9 @@ use super::run::RunArgs;
 /// Sizes stay what they were unless options say otherwise: lengths replace those of the first run, shapes and regions are added to its. Without any, sub-domains are meshed as they were.
 #[derive(Debug, clap::Args)]
 #[command(
-    mut_arg("size_field", |arg| arg.help("Edge lengths from a file: .npy, one for each tetrahedron (or vertex) of the named sub-domains in the order in which `tetdb export --subdomain` writes them; or a MEDIT .sol with its background .mesh of tetrahedra beside it")),
+    mut_arg("size_field", |arg| arg.help("Edge lengths from a file: .npy, one for each tetrahedron (or vertex) of the named sub-domains in the order in which `tetdb export --subdomain` writes them; or a MEDIT .sol with its background .mesh of tetrahedra beside it, .csv, .msh, .vtu or .mtr, as for `tetdb mesh`")),
     mut_arg("hsiz", |arg| arg.help("Edge length inside: a length, or 1% of the box diagonal [default: as it was]")),
+    mut_arg("hgrad", |arg| arg.help("Greatest ratio of neighboring edge lengths [default: as it was]")),
     after_help = "Examples:\n  tetdb resaturate part.tetdb --subdomain 5,9 --hsiz 1%\n  tetdb resaturate part.tetdb --subdomain 5 --refine-by 0.5\n  \
     tetdb resaturate part.tetdb --subdomain 5 --size-field h.npy\n  tetdb resaturate part.tetdb --changed --size-sphere 0,0,0,0.1,0.01 --dry-run\n  \
     tetdb resaturate part.tetdb --undo\n  tetdb resaturate part.tetdb --repair"

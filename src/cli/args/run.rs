@@ -16,7 +16,7 @@ pub struct ReadArgs {
 }
 
 /// The version to read.
-#[derive(Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 pub struct AtArgs {
     /// Read the store as it was in this version; see `tetdb version --help`
     #[arg(long, value_name = "NAME")]

@@ -35,6 +35,8 @@ pub struct InfoArgs {
 
 #[derive(Debug, clap::Args)]
 #[command(
+    mut_arg("repair", |arg| arg.help("With --against: repair that surface first, as `tetdb mesh --repair` does [default: as the store has on record]").long_help(None)),
+    mut_arg("allow_open", |arg| arg.help("With --against: treat the parts of that surface that are not closed as sheets")),
     after_help = "Examples:\n  tetdb verify part.tetdb\n  tetdb verify part.tetdb --full --against part.stl\n\n\
     Exit code 0: the mesh is valid; 7: it is not; 4: the store is damaged, and what is damaged is listed."
 )]

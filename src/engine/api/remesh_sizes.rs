@@ -149,7 +149,7 @@ fn refuse_regions(open: &mut Catalog, sizes: &SizeOptions) -> Result<(), Error> 
             let message =
                 format!("region {} of an imported mesh has no surface of its own", size.which);
             Err(Error::new(Code::NoSuchPart, message).with_help(
-                "give lengths in shapes, such as --size-sphere, or for whole sub-domains, with --subdomain and --hsiz",
+                "give lengths in shapes, such as a sphere, or one length for whole sub-domains",
             ))
         }
     }

@@ -75,8 +75,7 @@ pub struct SizeFile {
 /// Number of sub-domains of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Subdomains {
-    /// One for up to two million predicted tetrahedra. Above that, an even number with at most five million each, or ten million
-    /// in large meshes.
+    /// One for each ten million (10·2²⁰) predicted tetrahedra or part of them.
     #[default]
     Auto,
     /// This number, at least 1; fewer if they would have less than 25,000 tetrahedra.
