@@ -170,7 +170,8 @@ fn what_lies_far_from_a_part_stays_as_it_is() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let dir = DiskPath::from(dir.path());
         let field = Field { h: &|_| h, place: &ball, bounds };
-        let inserted = saturate(&mut mesh, &field, Mode::None, &dir, &mut |_| ()).refine.inserted;
+        let inserted =
+            saturate(&mut mesh, &field, Mode::None, &dir, &mut |_, _| ()).refine.inserted;
         assert!(inserted > 300, "{inserted} points");
         let (after, now) = sound(&mut mesh);
         assert!((now - volume).abs() < 1e-9 * volume);
@@ -226,7 +227,7 @@ fn a_mesh_in_bricks_is_that_in_pages() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let dir = DiskPath::from(dir.path());
         let field = Field { h: &|_| h, place: &Everywhere, bounds: surface.bounds() };
-        saturate(&mut in_pages, &field, Mode::Full, &dir, &mut |_| ());
+        saturate(&mut in_pages, &field, Mode::Full, &dir, &mut |_, _| ());
         mend(&mut in_pages, &|_| ());
         let (tets, _) = sound(&mut in_pages);
         let place = |tet: &Tet| by_places(in_pages.points(tet), tet.required_faces());
@@ -234,7 +235,11 @@ fn a_mesh_in_bricks_is_that_in_pages() {
         expected.sort_unstable();
 
         let (mut rest, _) = coarse(words, h);
-        let (_, finished) = saturate_to_seal(&mut rest, &field, Mode::Full, &dir, &mut |_| ());
+        let mut shares = vec![(0, 1)];
+        let mut progress = |done, total| shares.push((done, total));
+        let (_, finished) = saturate_to_seal(&mut rest, &field, Mode::Full, &dir, &mut progress);
+        assert!(shares.is_sorted() && shares.len() > 2, "{shares:?}");
+        assert!(shares.last().is_some_and(|&(done, total)| done + 100 > total), "{shares:?}");
         let finished = finished.expect("nothing is to be mended");
         assert_eq!((rest.n_tets(), finished.n_tets()), (0, tets.len() as u64));
         let mut points = Vec::new();
@@ -258,6 +263,6 @@ fn a_mesh_in_bricks_is_that_in_pages() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let dir = DiskPath::from(dir.path());
     let field = Field { h: &|_| 0.3, place: &Everywhere, bounds: surface.bounds() };
-    let (_, finished) = saturate_to_seal(&mut needles, &field, Mode::Full, &dir, &mut |_| ());
+    let (_, finished) = saturate_to_seal(&mut needles, &field, Mode::Full, &dir, &mut |_, _| ());
     assert!(finished.is_none() && sound(&mut needles).0.len() > 100);
 }

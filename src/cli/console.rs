@@ -44,10 +44,19 @@ struct Answer {
 
 struct State {
     stage: String,
-    /// Start of the stage.
+    /// Start of the stage, and what was done by then.
     since: Instant,
+    first: u64,
+    /// True if the total is known. Of some stages it is not at first.
+    has_total: bool,
     /// Time at which progress was last printed.
     printed: Instant,
+}
+
+impl State {
+    fn new(now: Instant) -> Self {
+        Self { stage: String::new(), since: now, first: 0, has_total: false, printed: now }
+    }
 }
 
 impl Console {
@@ -60,7 +69,7 @@ impl Console {
         let terminal = std::io::stderr().is_terminal() && !json && !quiet;
         let bar = if terminal {
             let target = ProgressDrawTarget::stderr_with_hz(10);
-            ProgressBar::with_draw_target(None, target).with_style(style(false))
+            ProgressBar::with_draw_target(None, target).with_style(style(false, ""))
         } else {
             ProgressBar::hidden()
         };
@@ -74,7 +83,7 @@ impl Console {
                 && std::env::var_os("TERM").is_none_or(|v| v != "dumb"),
             terminal,
             bar,
-            state: Arc::new(Mutex::new(State { stage: String::new(), since: now, printed: now })),
+            state: Arc::new(Mutex::new(State::new(now))),
             answer: Arc::default(),
             cancel: CancelToken::new(),
         }
@@ -209,15 +218,15 @@ impl Console {
         }
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let now = Instant::now();
-        let new_stage = state.stage != stage;
+        let new_stage = state.stage != stage || state.has_total != total.is_some();
         if new_stage {
             stage.clone_into(&mut state.stage);
-            state.since = now;
+            (state.since, state.first, state.has_total) = (now, done, total.is_some());
         }
         if self.terminal {
             if new_stage {
                 // Resetting draws the bar.
-                self.bar.set_style(style(total.is_some()));
+                self.bar.set_style(style(total.is_some(), unit));
                 self.bar.set_message(stage.to_owned());
                 self.bar.reset();
             }
@@ -228,11 +237,11 @@ impl Console {
         } else if now - state.printed >= PLAIN_EVERY {
             state.printed = now;
             let seconds = (now - state.since).as_secs_f64();
-            // With parallel work, stages alternate; a stage that has just begun has no meaningful rate.
-            let rate = (seconds > 1.0).then(|| done as f64 / seconds);
+            // A stage that has just begun has no meaningful rate.
+            let rate = (seconds > 1.0).then(|| done.saturating_sub(state.first) as f64 / seconds);
             let eta = total
                 .zip(rate)
-                .filter(|_| done > 0)
+                .filter(|&(_, rate)| rate > 0.0)
                 .map(|(t, rate)| t.saturating_sub(done) as f64 / rate);
             if self.json {
                 self.stderr_json(&serde_json::json!({
@@ -240,10 +249,7 @@ impl Console {
                         "unit": unit, "per_s": rate, "eta_s": eta }
                 }));
             } else {
-                let of = total.map_or(String::new(), |t| format!(" of {t}"));
-                let eta = eta.map_or(String::new(), |s| format!(", {s:.0} s to go"));
-                let rate = rate.map_or(String::new(), |r| format!(", {r:.0} per second"));
-                say(&format!("{stage}: {done}{of} {unit}{rate}{eta}"));
+                say(&plain_progress(stage, (done, total, unit), (rate, eta)));
             }
         }
     }
@@ -300,15 +306,53 @@ pub(super) fn unwritten(error: &std::io::Error, written: &str) -> Result<(), Fai
     Err(Failure::new(code, message).help("send it to a disk with more space"))
 }
 
-fn style(known_total: bool) -> ProgressStyle {
-    let template = if known_total {
-        "{msg:24} [{bar:30}] {percent:>3} %  {rate}  {eta} to go"
-    } else {
-        "{msg:24} {pos}  {rate}  {elapsed}"
+/// A line of progress, with counts in a unit, work per second and seconds to go.
+fn plain_progress(
+    stage: &str,
+    (done, total, unit): (u64, Option<u64>, &str),
+    (rate, eta): (Option<f64>, Option<f64>),
+) -> String {
+    let count = match total {
+        None if done == 0 => return stage.to_owned(),
+        Some(100) if unit == "%" => format!("{done} %"),
+        Some(total) => format!("{done} of {total} {unit}"),
+        None => format!("{done} {unit}"),
     };
-    let style = ProgressStyle::with_template(template);
+    let rate = rate.filter(|_| unit != "%");
+    let rate = rate.map_or(String::new(), |r| format!(", {r:.0} per second"));
+    let eta = eta.map_or(String::new(), |s| format!(", {s:.0} s to go"));
+    format!("{stage}: {count}{rate}{eta}")
+}
+
+/// The line of a stage on a terminal: with a bar if the total is known, with counts and a rate if there is a unit to count in.
+fn style(known_total: bool, unit: &str) -> ProgressStyle {
+    let template = match (known_total, unit) {
+        (true, "%") => "{msg:24} [{bar:30}] {percent:>3} %  {eta} to go".to_owned(),
+        (true, unit) => {
+            format!("{{msg:24}} [{{bar:30}}] {{percent:>3}} %  {{rate}} {unit}/s  {{eta}} to go")
+        }
+        (false, "") => "{msg:24} {elapsed}".to_owned(),
+        (false, unit) => format!("{{msg:24}} {{pos}} {unit}  {{rate}}/s  {{elapsed}}"),
+    };
+    let style = ProgressStyle::with_template(&template);
     let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
     style.with_key("rate", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
-        let _ = write!(out, "{}/s", short(state.per_sec()));
+        let _ = write!(out, "{}", short(state.per_sec()));
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plain_progress;
+
+    #[test]
+    fn lines_of_progress_name_what_they_count() {
+        let none = (None, None);
+        assert_eq!(plain_progress("validate", (0, None, "steps"), none), "validate");
+        assert_eq!(plain_progress("read", (7, None, "bytes"), none), "read: 7 bytes");
+        let known = plain_progress("seal", (20, Some(80), "records"), (Some(10.0), Some(6.0)));
+        assert_eq!(known, "seal: 20 of 80 records, 10 per second, 6 s to go");
+        let share = plain_progress("mend", (40, Some(100), "%"), (Some(2.0), Some(30.0)));
+        assert_eq!(share, "mend: 40 %, 30 s to go");
+    }
 }

@@ -277,7 +277,7 @@ fn pages_that_are_no_mesh_are_damage() -> Outcome {
     let (path, token) = (dir.path().join("a.tetdb"), CancelToken::new());
     let inner = token.clone();
     let begun = mesher()?.cancel(&token).progress(move |event| {
-        if let Event::Progress { stage: "divide edges", .. } = event {
+        if let Event::Progress { stage: "divide and smooth", .. } = event {
             inner.cancel();
         }
     });

@@ -93,17 +93,17 @@ pub struct InterfaceFaces {
 
 /// The first part of a cut: the plane is chosen and its zone refined. `dir` takes what leaves memory.
 ///
-/// `progress` receives a stage and how much of it is done. Effects: all ids of tetrahedra of `host` may change. Unwinds with errors of
+/// `progress` receives a stage and, if it is known, how many predicted tetrahedra of how many are done. Effects: all ids of tetrahedra of `host` may change. Unwinds with errors of
 /// the disk.
 pub fn refine<P: Pages>(
     host: &mut Mesh<P>,
     plan: &CutPlan,
     dir: &DiskPath,
-    progress: &dyn Fn(&'static str, u64),
+    progress: &dyn Fn(&'static str, Option<(u64, u64)>),
 ) -> RefinedZone {
     let clock = Instant::now();
     let mut seconds = StageSeconds::default();
-    progress("choose a plane", 0);
+    progress("choose a plane", None);
     plane::set_sizes(host, plan.h);
     let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.plane);
     seconds.plane = clock.elapsed().as_secs_f64();
@@ -113,7 +113,7 @@ pub fn refine<P: Pages>(
         place: &zone::InZone { zone: &zone, earlier: plan.earlier },
         bounds: plan.bounds,
     };
-    let progress = &mut |n| progress("refine the zone", n);
+    let progress = &mut |done, total| progress("refine the zone", Some((done, total)));
     let refine = blocks::saturate(host, &field, Mode::None, dir, progress).refine;
     seconds.zone = clock.elapsed().as_secs_f64() - seconds.plane;
     RefinedZone { zone, plane, refine, seconds }
@@ -127,11 +127,11 @@ pub fn choose<P: Pages, Q: Pages>(
     plan: &CutPlan,
     refined: RefinedZone,
     mut faces: Option<&mut InterfaceFaces>,
-    progress: &dyn Fn(&'static str, u64),
+    progress: &dyn Fn(&'static str, Option<(u64, u64)>),
 ) -> OpenCut {
     let RefinedZone { zone, plane, refine, mut seconds } = refined;
     let clock = Instant::now();
-    progress("choose the interface", 0);
+    progress("choose the interface", None);
     let core_boundary = core::extract(host, core, &zone.surface);
     let mut settings = plan.optimize;
     settings.odt_sweeps = settings.odt_sweeps.min(CORE_SWEEPS);

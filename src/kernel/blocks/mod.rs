@@ -20,6 +20,7 @@ mod improve;
 mod insert;
 mod lawson;
 mod load;
+mod memory;
 mod part;
 mod partition;
 mod placement;
@@ -33,7 +34,7 @@ mod spawn;
 mod tasks;
 mod visits;
 
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::sync::{Mutex, PoisonError};
 
 use crate::mesh::Mesh;
@@ -41,15 +42,15 @@ use crate::optimize::Mode;
 use brick::Bricks;
 pub use field::Field;
 pub use finish::{Finished, FinishedTet, FinishedVertex};
+use memory::Memory;
 use part::Part;
+use partition::KdPartition;
 pub use partition::block_tets;
-use partition::{KdPartition, TOO_STEEP};
 pub use placement::{Everywhere, PlacementRule};
 pub use report::{BlockReport, RefineReport};
 use scaffold::COARSER;
-use tasks::Graph;
-use tetdb_base::storage::{DiskPath, Pages, StorageError, raise, spare_threads};
-use visits::{DIVIDE, SMOOTH, Visitor, Visits};
+use tetdb_base::storage::{DiskPath, Pages};
+use visits::{DIVIDE, SMOOTH, Visits};
 
 /// Fewest tetrahedra of the scaffold's lengths that are worth a saturation of their own.
 const COARSE_TETS: f64 = 20_000.0;
@@ -58,25 +59,23 @@ const PART_RINGS: [u32; 3] = [3, 8, 24];
 
 /// Divides tetrahedra until the mesh is saturated; smooths it unless `mode` is `None`, and improves bad tetrahedra if it is `Full`.
 ///
-/// The mesh must hold filled regions only, sizes set at all its vertices. `dir` takes bricks that leave memory. `progress` receives the
-/// number of vertices inserted so far. Effects: new vertices and tetrahedra; ids of tetrahedra change, those of vertices stay; `tet_of` is
-/// not kept up. Unwinds with errors of the disk.
+/// The mesh must hold filled regions only, sizes set at all its vertices. `dir` takes bricks that leave memory. `progress` receives
+/// predicted tetrahedra: those of blocks that are done, and all. Effects: new vertices and tetrahedra; ids of tetrahedra change, those of
+/// vertices stay; `tet_of` is not kept up. Unwinds with errors of the disk.
 pub fn saturate<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &Field,
     mode: Mode,
     dir: &DiskPath,
-    progress: &mut dyn FnMut(u64),
+    progress: &mut dyn FnMut(u64, u64),
 ) -> BlockReport {
     if !field.place.is_partial() {
         return saturate_all(mesh, field, mode, dir, progress).into_pages(mesh);
     }
     let mut report = BlockReport::default();
     for rings in PART_RINGS {
-        let before = report.refine.inserted;
         let how = How { mode, is_final: true, rings: Some(rings) };
-        let told = &mut |n| progress(before + n);
-        let made = saturate_at(mesh, field, how, dir, told).into_pages(mesh);
+        let made = saturate_at(mesh, field, how, dir, progress).into_pages(mesh);
         report.operations.add(&made.operations);
         report.refine.add(&made.refine);
         report.refine.unexamined = made.refine.unexamined;
@@ -94,7 +93,7 @@ pub fn saturate_to_seal<P: Pages>(
     field: &Field,
     mode: Mode,
     dir: &DiskPath,
-    progress: &mut dyn FnMut(u64),
+    progress: &mut dyn FnMut(u64, u64),
 ) -> (BlockReport, Option<Finished>) {
     let mut saturated = saturate_all(mesh, field, mode, dir, progress);
     let Some(look) = finish::look(&saturated.bricks, saturated.n_bricks) else {
@@ -111,14 +110,14 @@ fn saturate_all<P: Pages>(
     field: &Field,
     mode: Mode,
     dir: &DiskPath,
-    progress: &mut dyn FnMut(u64),
+    progress: &mut dyn FnMut(u64, u64),
 ) -> Saturated {
     let load = load::predict(mesh, field);
     load::check(load.tets);
     let is_void = load.in_voids > COARSE_TETS.max(f64::from(mesh.n_tets()));
     let coarser = if is_void { saturate_coarser(mesh, field, dir) } else { 0 };
     let how = How { mode, is_final: true, rings: None };
-    let mut made = saturate_at(mesh, field, how, dir, &mut |n| progress(coarser + n));
+    let mut made = saturate_at(mesh, field, how, dir, progress);
     made.report.refine.inserted += coarser;
     made
 }
@@ -165,7 +164,7 @@ fn saturate_at<P: Pages>(
     field: &Field,
     How { mode, is_final, rings }: How,
     dir: &DiskPath,
-    progress: &mut dyn FnMut(u64),
+    progress: &mut dyn FnMut(u64, u64),
 ) -> Saturated {
     let scaffold = scaffold::build(mesh, field);
     let part = rings.map(|rings| Part::around(mesh, field, rings));
@@ -198,31 +197,18 @@ fn saturate_at<P: Pages>(
             refine: RefineReport { inserted: scaffold, ..RefineReport::default() },
             ..BlockReport::default()
         }),
-        inserted: AtomicU64::new(scaffold),
+        done: AtomicU64::new(0),
         left: blocks.map(|_| AtomicBool::new(false)).collect(),
         unexamined: (0..n_bricks).map(|_| AtomicU32::new(0)).collect(),
     };
-    let mut run = |visits: &Visits, phases, is_last: bool| {
-        let mut graph = Graph::new(&visits.partition, phases);
-        if memory.bricks < usize::MAX {
-            graph.go_along_the_tree();
-        }
-        let visit = |visitor: &mut Visitor, task| {
-            let (phase, block) = graph.visit(task);
-            if !is_last || visits.is_left(block) {
-                visits.visit(visitor, phase, block, is_last);
-            }
-        };
-        let mut told = || progress(visits.inserted.load(Ordering::Relaxed));
-        graph.run(memory.threads, &Visitor::new, &visit, &mut told);
-    };
     let is_smoothed = mode != Mode::None;
-    run(&visits, DIVIDE..if is_smoothed { SMOOTH + 1 } else { SMOOTH }, false);
+    let phases = DIVIDE..if is_smoothed { SMOOTH + 1 } else { SMOOTH };
+    visits.run(phases, false, &memory, progress);
     // Shorter lengths divide what coarser ones leave.
     let unexamined = if is_final { visits.finish_rest() } else { 0 };
     if is_smoothed && visits.is_any_left() {
         visits.narrow();
-        run(&visits, SMOOTH..SMOOTH + 1, true);
+        visits.run(SMOOTH..SMOOTH + 1, true, &memory, progress);
     }
     let mut report = visits.report.into_inner().unwrap_or_else(PoisonError::into_inner);
     report.refine.unexamined = unexamined;
@@ -245,55 +231,10 @@ fn saturate_coarser<P: Pages>(mesh: &mut Mesh<P>, field: &Field, dir: &DiskPath)
     let h = |p| COARSER * (field.h)(p);
     let coarser = Field { h: &h, place: field.place, bounds: field.bounds };
     let how = How { mode: Mode::None, is_final: false, rings: None };
-    let made = saturate_at(mesh, &coarser, how, dir, &mut |_| ()).into_pages(mesh);
+    let made = saturate_at(mesh, &coarser, how, dir, &mut |_, _| ()).into_pages(mesh);
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, (field.h)(p) as f32);
     }
     made.refine.inserted
-}
-
-/// Bytes of memory by use, and threads.
-struct Memory {
-    /// Of the bricks.
-    bricks: usize,
-    /// Of the pages while blocks are visited, and while bricks are made of them or they of bricks.
-    pages: u64,
-    pages_at_first: u64,
-    threads: usize,
-}
-
-/// Bytes of a visit, and per predicted tetrahedron of a large region: its arrays, and its bricks twice. Regions are large in large
-/// sub-domains, since the number of blocks is bounded, and where lengths change steeply.
-const VISIT_BYTES: u64 = 16 << 20;
-const VISIT_TET_BYTES: f64 = 160.0;
-/// Bytes of bricks per predicted tetrahedron.
-const TET_BYTES: u64 = 50;
-
-impl Memory {
-    /// Divides what the pages may use.
-    fn of<P: Pages>(mesh: &Mesh<P>, partition: &KdPartition) -> Self {
-        let threads = spare_threads();
-        let Some([used, most]) = mesh.pages().bytes_used() else {
-            return Self { bricks: usize::MAX, pages: u64::MAX, pages_at_first: u64::MAX, threads };
-        };
-        let load = partition.load();
-        let visit = VISIT_BYTES.max((partition.largest_region() * VISIT_TET_BYTES) as u64);
-        // Where lengths change steeply, predictions of regions are several times too high.
-        if visit > VISIT_BYTES && visit / 8 > most {
-            raise(StorageError::Budget { what: TOO_STEEP, needed: visit, available: most });
-        }
-        let wanted = (1.5 * load) as u64 * TET_BYTES;
-        if used + 2 * wanted + threads as u64 * visit <= most {
-            return Self { bricks: usize::MAX, pages: most, pages_at_first: most, threads };
-        }
-        let threads = threads.min((most / 2 / visit).max(1) as usize);
-        let rest = most.saturating_sub(threads as u64 * visit).max(most / 4);
-        Self {
-            bricks: (rest - rest / 8) as usize,
-            pages: rest / 8,
-            pages_at_first: most / 2,
-            threads,
-        }
-    }
 }

@@ -150,6 +150,12 @@ impl KdPartition {
         regions.map(|region| region.iter().map(|&b| load(b)).sum()).fold(0.0, f64::max)
     }
 
+    /// Bytes of all lists of bricks and blocks.
+    pub fn bytes_listed(&self) -> u64 {
+        let lists = self.blocks.iter().flat_map(|b| b.regions.iter().chain(&b.conflicts));
+        lists.map(|list| (list.len() * size_of::<u32>()) as u64).sum()
+    }
+
     /// Predicted tetrahedra of all blocks.
     pub fn load(&self) -> f64 {
         self.blocks.iter().map(|b| b.load).sum()

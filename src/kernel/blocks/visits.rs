@@ -1,5 +1,6 @@
 //! Visits of blocks: what is done with one while nobody else has its bricks.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -7,10 +8,12 @@ use super::brick::Bricks;
 use super::divide::Divider;
 use super::field::Field;
 use super::improve;
+use super::memory::Memory;
 use super::partition::{Block, KdPartition};
 use super::region::Region;
 use super::report::BlockReport;
 use super::smooth::Smoother;
+use super::tasks::Graph;
 use crate::mesh::Tet;
 use crate::mesh::anatomy::MARK;
 use crate::mesh::anatomy::mark::EXAMINED;
@@ -33,7 +36,8 @@ pub(super) struct Visits<'a> {
     pub mode: Mode,
     pub bricks: Bricks,
     pub report: Mutex<BlockReport>,
-    pub inserted: AtomicU64,
+    /// Loads of all visits that are over, but for those that wait.
+    pub done: AtomicU64,
     /// Blocks whose second visit waits until all is divided.
     pub left: Vec<AtomicBool>,
     /// [`super::brick::Brick::unexamined`] of each brick since its last visit: bricks need not be in memory to be asked.
@@ -54,6 +58,38 @@ impl Visitor {
 }
 
 impl Visits<'_> {
+    /// Does all visits of some phases; of the last ones, only those that wait. `progress` receives predicted tetrahedra: those done, and all.
+    pub fn run(
+        &self,
+        phases: Range<usize>,
+        is_last: bool,
+        memory: &Memory,
+        progress: &mut dyn FnMut(u64, u64),
+    ) {
+        let mut graph = Graph::new(&self.partition, phases);
+        if memory.bricks < usize::MAX {
+            graph.go_along_the_tree();
+        }
+        let visit = |visitor: &mut Visitor, task| {
+            let (phase, block) = graph.visit(task);
+            if is_last && !self.is_left(block) {
+                return;
+            }
+            self.visit(visitor, phase, block, is_last);
+            if is_last || phase == DIVIDE || !self.is_left(block) {
+                let load = self.partition.blocks[block].load as u64;
+                self.done.fetch_add(load, Ordering::Relaxed);
+            }
+        };
+        let n_visits = if self.mode == Mode::None { 1.0 } else { 2.0 };
+        let load = self.partition.load();
+        let mut told = || {
+            let done = self.done.load(Ordering::Relaxed) as f64 / n_visits;
+            progress(done.min(load) as u64, load as u64);
+        };
+        graph.run(memory.threads, &Visitor::new, &visit, &mut told);
+    }
+
     /// Visits a block; `is_last` tells whether nothing more will be divided.
     pub fn visit(&self, visitor: &mut Visitor, phase: usize, id: usize, is_last: bool) {
         let block = &self.partition.blocks[id];
@@ -224,7 +260,6 @@ impl Visits<'_> {
     fn divide(&self, visitor: &mut Visitor, is_due: &[bool], own: u32) {
         let Visitor { region, divider, .. } = visitor;
         let report = divider.divide(region, &self.partition, self.field, is_due, own);
-        self.inserted.fetch_add(report.inserted, Ordering::Relaxed);
         self.report.lock().unwrap_or_else(PoisonError::into_inner).refine.add(&report);
     }
 }

@@ -49,15 +49,17 @@ impl Settings {
     }
 }
 
-/// Where a run is: the name of the stage, and pages done of those there are.
+/// Where a run is: the name of the stage, and how much of it is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Name of the stage.
     pub stage: &'static str,
-    /// Pages done.
+    /// How much is done, in `unit`.
     pub done: u32,
-    /// Pages there are.
+    /// How much there is, in `unit`.
     pub total: u32,
+    /// Unit of both; `%` if nothing can be counted.
+    pub unit: &'static str,
 }
 
 /// What a run did.
@@ -94,34 +96,36 @@ pub fn run_with<P: Pages>(
     progress: &dyn Fn(Progress),
 ) -> OptimizeReport {
     let mut report = OptimizeReport::default();
-    let tell = |stage, done, total| progress(Progress { stage, done, total });
-    tell("delaunay", 0, settings.odt_sweeps + 1);
+    let tell = |stage, unit, done, total| progress(Progress { stage, done, total, unit });
+    tell("delaunay", "sweeps", 0, settings.odt_sweeps + 1);
     prepare(mesh);
     let mut lawson = Lawson::default();
     let mut way = Way::Up;
     lawson.sweep(mesh, way);
     for sweep in 0..settings.odt_sweeps {
-        tell("smooth", sweep, settings.odt_sweeps);
+        tell("smooth", "sweeps", sweep, settings.odt_sweeps);
         way = way.turned();
         let moves = odt::sweep(mesh, way);
         report.odt_moves += moves.moved;
         report.odt_held += moves.held;
-        tell("delaunay", sweep + 1, settings.odt_sweeps + 1);
+        tell("delaunay", "sweeps", sweep + 1, settings.odt_sweeps + 1);
         lawson.sweep(mesh, way);
     }
     report.flips = lawson.stats;
     if settings.mode == Mode::Full {
         let mut rounds = Rounds::new(PageFlags::all(mesh));
-        rounds.run(mesh, BAD, &mut |done, total| tell("quality", done, total));
+        rounds.run(mesh, BAD, &mut |done, total| tell("quality", "pages", done, total));
         let bad = rounds.finish(mesh);
         rounds.flags.clone_from(&bad);
-        rounds.run(mesh, WORST, &mut |done, total| tell("improve the worst", done, total));
+        rounds.run(mesh, WORST, &mut |done, total| tell("improve the worst", "pages", done, total));
         rounds.finish(mesh);
         rounds.flags = bad;
-        rounds.run(mesh, SHARE, &mut |done, total| tell("improve low qualities", done, total));
+        rounds.run(mesh, SHARE, &mut |done, total| {
+            tell("improve low qualities", "pages", done, total)
+        });
         let mut bad = rounds.finish(mesh);
         report.operations = rounds.counts;
-        report.mended = mended(mesh, &mut bad, &tell);
+        report.mended = mended(mesh, &mut bad, progress);
     }
     report
 }
@@ -129,10 +133,13 @@ pub fn run_with<P: Pages>(
 fn mended<P: Pages>(
     mesh: &mut Mesh<P>,
     bad: &mut PageFlags,
-    tell: &dyn Fn(&'static str, u32, u32),
+    progress: &dyn Fn(Progress),
 ) -> MendCounts {
     let mut mender = Mender::default();
-    mender.run(mesh, bad, &mut |done| tell("mend", (1000.0 * done) as u32, 1000));
+    mender.run(mesh, bad, &mut |share| {
+        let done = (100.0 * share) as u32;
+        progress(Progress { stage: "mend", done, total: 100, unit: "%" });
+    });
     mender.counts()
 }
 
@@ -140,7 +147,7 @@ fn mended<P: Pages>(
 pub fn mend<P: Pages>(mesh: &mut Mesh<P>, progress: &dyn Fn(Progress)) -> MendCounts {
     prepare(mesh);
     let mut all = PageFlags::all(mesh);
-    mended(mesh, &mut all, &|stage, done, total| progress(Progress { stage, done, total }))
+    mended(mesh, &mut all, progress)
 }
 
 /// Rounds for tetrahedra that need them, but for those listed, whose turn is another time. `tet_of` must be right, all marks down; so are

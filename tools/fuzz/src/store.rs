@@ -92,7 +92,7 @@ fn sound(made: Made) -> Sound {
             let token = CancelToken::new();
             let cancelled = token.clone();
             let ending = settings().cancel(&token).progress(move |event| {
-                if let Event::Progress { stage: "divide edges", .. } = event {
+                if let Event::Progress { stage: "divide and smooth", .. } = event {
                     cancelled.cancel();
                 }
             });

@@ -79,17 +79,17 @@ pub fn recovered_and_colored<P: Pages, T>(
     watch: &Watcher,
     color: impl FnOnce(&mut Mesh<P>) -> Result<T, PipelineError>,
 ) -> Result<(RecoveryReport, T), PipelineError> {
-    watch(stage("recover the surface"));
+    watch(Event::begin("recover the surface"));
     mesh.refresh_tet_of();
     let recovery = recover_with_progress(mesh, &|done, total| {
         watch(Event {
             done,
             total: (total > 0).then_some(total),
             unit: "edges and triangles",
-            ..stage("recover the surface")
+            ..Event::begin("recover the surface")
         });
     })?;
-    watch(stage("color the regions"));
+    watch(Event::begin("color the regions"));
     let colored = color(mesh)?;
     if recovery.missing_segments + recovery.missing_facets > 0 {
         // Recovery leaves the mesh non-Delaunay. In a Delaunay mesh, inserted points have smaller cavities: dividing a scanned
@@ -97,10 +97,6 @@ pub fn recovered_and_colored<P: Pages, T>(
         optimize::run(mesh, optimize::Mode::None, &|p| watch(p.into()));
     }
     Ok((recovery, colored))
-}
-
-fn stage(stage: &'static str) -> Event {
-    Event { stage, done: 0, total: None, unit: "" }
 }
 
 /// Inserts the surface's vertices and adds its facets to the mesh.

@@ -11,7 +11,7 @@ use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::leases::Leases;
 use crate::pipeline::plan::subdomains::n_subdomains;
 use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
-use crate::pipeline::progress::Watcher;
+use crate::pipeline::progress::{JobProgress, Watcher};
 use crate::pipeline::seal::totals::{by_threads, journal};
 use crate::pipeline::tasks::{ask, begin, wrong_receipt};
 use crate::pipeline::tree::{self, DONE};
@@ -350,9 +350,20 @@ impl<'a> Run<'a> {
         }
         let (workers, watch) = (self.plan.workers().min(left.len()), self.watch);
         let share = self.plan.shared_by(workers.max(1) as u64);
+        let sealed: u64 = self.catalog.subdomains()?.iter().map(|row| row.tets).sum();
+        let predicted = |load: f64| TETS_PER_LOAD * load;
+        let rest: f64 = left.iter().map(|part| predicted(part.load)).sum();
+        let done = [sealed as f64, sealed as f64 + rest];
+        let progress = &JobProgress::new("mesh sub-domains", "tetrahedra", done);
+        let of = |order: &SubdomainOrder| {
+            let part = order.mesh;
+            (part.ranks.first, predicted(part.load))
+        };
         let here = |order: SubdomainOrder, watch: &Watcher| {
+            let work = of(&order);
             let job = worker.subdomain_job(order, share)?;
-            let leaf = job.run(worker.common, watch)?;
+            let leaf = job.run(worker.common, &|event| progress.heard(work, event, watch))?;
+            progress.finished(work, watch);
             Ok((Box::new(leaf.receipt()), Some(leaf.fine)))
         };
         let there = match left.is_empty() {
@@ -362,14 +373,15 @@ impl<'a> Run<'a> {
         let store = &worker.place.store;
         let elsewhere: Vec<_> = (there.iter())
             .map(|(pool, slot)| {
-                move |order: SubdomainOrder, _: &Watcher| match ask(
-                    &**pool,
-                    *slot,
-                    &WorkOrder::Subdomain(order),
-                    store,
-                )? {
-                    Receipt::Subdomain(receipt) => Ok((Box::new(receipt), None)),
-                    Receipt::Cut(_) => Err(wrong_receipt()),
+                move |order: SubdomainOrder, watch: &Watcher| {
+                    let work = of(&order);
+                    match ask(&**pool, *slot, &WorkOrder::Subdomain(order), store)? {
+                        Receipt::Subdomain(receipt) => {
+                            progress.finished(work, watch);
+                            Ok((Box::new(receipt), None))
+                        }
+                        Receipt::Cut(_) => Err(wrong_receipt()),
+                    }
                 }
             })
             .collect();

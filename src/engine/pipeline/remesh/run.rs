@@ -11,7 +11,7 @@ use super::summary::{Forecast, ResaturateSummary, Resaturated};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::import::GENERATION;
 use crate::pipeline::plan::{Options, Plan, REFUSED_BELOW};
-use crate::pipeline::progress::Watcher;
+use crate::pipeline::progress::{JobProgress, Watcher};
 use crate::pipeline::seal::totals::{journal, sum_totals, totals_of};
 use crate::pipeline::tree::{self, read_blob};
 use crate::pipeline::work::coarse_snapshot::reopen;
@@ -274,8 +274,21 @@ impl<'a> RemeshRun<'a> {
         let share = plan.shared_by(workers as u64).without_file();
         let whole = Arc::clone(&self.field);
         let common = Common::new(self.options, &whole, bounds);
+        let tets = self.rows.iter().map(|(row, _)| row.tets).sum::<u64>().max(1);
+        let per_cent = 100.0 / tets as f64;
+        let work: BTreeMap<u32, f64> =
+            self.rows.iter().map(|(row, _)| (row.rank, row.tets as f64 * per_cent)).collect();
+        let progress = JobProgress::new("mesh sub-domains again", "%", [0.0, 100.0]);
         let mut state = (self, BTreeMap::new());
-        let run = &|job: RemeshJob, watch: &Watcher| job.run(common, watch).map(Box::new);
+        let run = &|job: RemeshJob, watch: &Watcher| {
+            let job_of_all = (job.kept.rank, work[&job.kept.rank]);
+            let done = match work.len() {
+                1 => job.run(common, watch)?,
+                _ => job.run(common, &|event| progress.heard(job_of_all, event, watch))?,
+            };
+            progress.finished(job_of_all, watch);
+            Ok(Box::new(done))
+        };
         map_bounded(
             &mut state,
             fields.into_iter().collect(),

@@ -67,8 +67,8 @@ impl CutJob<'_> {
             bounds: common.bounds,
             optimize: Settings::of(common.mode),
         };
-        let progress = |stage, done| {
-            watch(Event { stage, done, total: None, unit: "vertices" });
+        let progress = |stage, done: Option<_>| {
+            watch(done.map_or(Event::begin(stage), |done| Event::tets(stage, done)));
         };
         let kept = common.keeps_stages.then(|| StageFiles {
             cut: ranks.cut(),

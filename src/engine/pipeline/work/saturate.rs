@@ -32,7 +32,8 @@ pub fn saturate_and_optimize<P: Pages>(
     dir: &DiskPath,
     watch: &Watcher,
 ) -> (FineReport, Option<Finished>) {
-    watch(Event { stage: "divide edges", done: 0, total: None, unit: "vertices" });
+    const STAGE: &str = "divide and smooth";
+    watch(Event::begin(STAGE));
     let clock = Instant::now();
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
@@ -42,9 +43,7 @@ pub fn saturate_and_optimize<P: Pages>(
     let outside = OutsideZones(zones);
     let place: &dyn PlacementRule = if zones.is_empty() { &Everywhere } else { &outside };
     let wanted = Field { h: &h, place, bounds: common.bounds };
-    let told = &mut |inserted| {
-        watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
-    };
+    let told = &mut |done, total| watch(Event::tets(STAGE, (done, total)));
     let (report, finished) = match common.mode {
         Mode::None => (blocks::saturate(mesh, &wanted, Mode::None, dir, told), None),
         mode => blocks::saturate_to_seal(mesh, &wanted, mode, dir, told),

@@ -57,8 +57,8 @@ pub(super) struct Mender {
     queue: BinaryHeap<(u64, u32)>,
     /// Names of what was tried in vain.
     failed: HashSet<u64>,
-    /// Names of balls whose vertex does not move for the product, and whether they are flat.
-    at_rest: HashMap<u64, bool>,
+    /// Vertices that do not move for the product, the names of their balls, and whether these are flat.
+    at_rest: HashMap<u32, (u64, bool)>,
     /// The worst q in the last list's pages that the surface forces.
     forced: f64,
     /// Vertices around which something changed in this pass, and in the one before.
@@ -71,7 +71,7 @@ impl Mender {
         self.operator.counts
     }
 
-    /// Mends what is bad in the flagged pages. `progress` is told the share done of a pass.
+    /// Mends what is bad in the flagged pages. `progress` is told the share done, which never falls.
     pub(super) fn run<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -82,11 +82,16 @@ impl Mender {
         if self.list(mesh, pages, &WORST).is_empty() {
             return;
         }
-        for stage in &STAGES {
+        for (k, stage) in STAGES.iter().enumerate() {
             let mut flags = pages.clone();
             self.failed.clear();
             self.at_rest.clear();
-            for _ in 0..stage.passes_max {
+            for pass in 0..stage.passes_max as i32 {
+                // A pass takes half as long as the one before, or less.
+                let of_all = |share: f64| {
+                    let left = (1.0 - 0.5 * share) * 0.5_f64.powi(pass);
+                    ((k + 1) as f64 - left) / STAGES.len() as f64
+                };
                 let before = self.operator.counts.changes();
                 if stage.goal == Goal::Quality {
                     self.lift(mesh, &flags, stage);
@@ -95,7 +100,7 @@ impl Mender {
                 let Some(stage) = stage.at(&list, self.forced) else {
                     break;
                 };
-                self.pass(mesh, list, &mut flags, &stage, progress);
+                self.pass(mesh, list, &mut flags, &stage, &mut |share| progress(of_all(share)));
                 if self.operator.counts.changes() == before {
                     break;
                 }
@@ -145,7 +150,7 @@ impl Mender {
                     return false;
                 }
                 let around = mover.name(mesh);
-                if let Some(&is_flat) = self.at_rest.get(&around) {
+                if let Some(&(_, is_flat)) = self.at_rest.get(&v).filter(|rest| rest.0 == around) {
                     return is_flat;
                 }
                 let is_moved = mover.raise_product(mesh);
@@ -155,7 +160,7 @@ impl Mender {
                 }
                 // One that is stuck between others in a cluster may move after them.
                 let is_flat = mover.is_flat();
-                self.at_rest.insert(around, is_flat);
+                self.at_rest.insert(v, (around, is_flat));
                 is_flat
             });
             if self.operator.counts.vertices_moved == before {
