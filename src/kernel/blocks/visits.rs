@@ -88,6 +88,8 @@ impl Visits<'_> {
             progress(done.min(load) as u64, load as u64);
         };
         graph.run(memory.threads, &Visitor::new, &visit, &mut told);
+        // The last tasks may have been other threads'.
+        told();
     }
 
     /// Visits a block; `is_last` tells whether nothing more will be divided.
