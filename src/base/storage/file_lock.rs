@@ -281,9 +281,10 @@ fn may_live(path: &Path) -> bool {
     let Some(holder) = Holder::read(path) else {
         return true;
     };
-    // Another process may have its number by now.
+    // Another process may have its number by now. Where the system does not say when a process began, it may be the same.
+    let now = began(holder.process);
     let is_another =
-        holder.host == host_name() && holder.began != 0 && began(holder.process) != holder.began;
+        holder.host == host_name() && ![now, holder.began].contains(&0) && now != holder.began;
     !is_another && !is_process_gone(&holder.host, holder.process)
 }
 
