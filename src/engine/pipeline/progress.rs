@@ -61,7 +61,7 @@ pub struct JobProgress {
 struct JobWork {
     /// Of jobs that are over.
     done: f64,
-    /// What is done of each job that runs.
+    /// How much of each running job is done.
     running: BTreeMap<u32, f64>,
 }
 

@@ -93,8 +93,8 @@ pub struct InterfaceFaces {
 
 /// The first part of a cut: the plane is chosen and its zone refined. `dir` takes what leaves memory.
 ///
-/// `progress` receives a stage and, if it is known, how many predicted tetrahedra of how many are done. Effects: all ids of tetrahedra of `host` may change. Unwinds with errors of
-/// the disk.
+/// `progress` receives a stage and, if it is known, how many predicted tetrahedra of how many are done. Effects: all ids of
+/// tetrahedra of `host` may change. Unwinds with errors of the disk.
 pub fn refine<P: Pages>(
     host: &mut Mesh<P>,
     plan: &CutPlan,

@@ -71,7 +71,7 @@ impl Mender {
         self.operator.counts
     }
 
-    /// Mends what is bad in the flagged pages. `progress` is told the share done, which never falls.
+    /// Mends what is bad in the flagged pages. `progress` receives the share done, which never falls.
     pub(super) fn run<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
