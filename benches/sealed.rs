@@ -190,8 +190,7 @@ fn store(vertices: &[SealedVertex], tets: &[SealedTet]) {
         (Level::Delaunay, 64),
         (Level::Delaunay, 512),
     ] {
-        let options =
-            VerifyOptions { level, memory_bytes: megabytes << 20, temp_dir: dir.path().to_owned() };
+        let options = VerifyOptions::new(level, megabytes << 20, dir.path().to_owned());
         let start = cpu_seconds();
         let report = Catalog::open(&path)
             .and_then(|mut s| verify(&mut s, None, &options))

@@ -50,8 +50,7 @@ fn made(surface: &Surface, mesh: &MeshOptions, plan: Option<Plan>) -> Made {
     catalog.close().expect("room on the disk");
     let mut store = Catalog::open(&path).expect("what was just written");
     let rows = store.subdomains().expect("sealed rows");
-    let verify =
-        VerifyOptions { level: Level::Delaunay, memory_bytes: 64 << 20, temp_dir: path.clone() };
+    let verify = VerifyOptions::new(Level::Delaunay, 64 << 20, path.clone());
     let report = audit::verify(&mut store, Some(surface), &verify).expect("a sound store");
     assert!(report.valid, "{report:?}");
     let bad = rows.iter().flat_map(|row| &row.quality.bins[1..]).sum();

@@ -47,8 +47,7 @@ fn mesh_cut_by<T>(
 
 fn verified(path: &Path, surface: &Surface) -> Report {
     let mut store = Catalog::open(path).expect("what was just written");
-    let verify =
-        VerifyOptions { level: Level::Delaunay, memory_bytes: 64 << 20, temp_dir: path.to_owned() };
+    let verify = VerifyOptions::new(Level::Delaunay, 64 << 20, path.to_owned());
     audit::verify(&mut store, Some(surface), &verify).expect("a sound store")
 }
 

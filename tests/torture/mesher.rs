@@ -105,11 +105,7 @@ pub fn whole(shape: &Shape, optimize: &str) -> Outcome {
     };
     catalog.close().expect("the store can be closed");
     let mut store = Catalog::open(&path).expect("the store was just made");
-    let options = VerifyOptions {
-        level: Level::Delaunay,
-        memory_bytes: 64 << 20,
-        temp_dir: dir.path().to_owned(),
-    };
+    let options = VerifyOptions::new(Level::Delaunay, 64 << 20, dir.path().to_owned());
     let report = audit::verify(&mut store, Some(&surface), &options).expect("the store is sound");
     let n = surface.n_triangles() as u64;
     if !report.valid || report.triangles_missing != 0 || report.triangles_present != n {

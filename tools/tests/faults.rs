@@ -161,11 +161,7 @@ fn verified(
     disk: &std::sync::Arc<SimDisk>,
 ) -> Result<bool, tetdb_store::store::StoreError> {
     let scratch = tempfile::tempdir().expect("a temporary directory");
-    let options = VerifyOptions {
-        level: Level::Delaunay,
-        memory_bytes: 32 << 20,
-        temp_dir: scratch.path().to_owned(),
-    };
+    let options = VerifyOptions::new(Level::Delaunay, 32 << 20, scratch.path().to_owned());
     let mut store = Catalog::open(case.store(disk))?;
     Ok(audit::verify(&mut store, None, &options)?.valid)
 }

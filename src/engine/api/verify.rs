@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde::Serialize;
 use tetdb_schema::code::Code;
@@ -85,7 +86,14 @@ pub(super) fn check(
     cap: u64,
     level: Level,
 ) -> Result<Report, Error> {
-    let options = verify_shared::options((cap, settings.scratch_dir()), surface, level);
+    let mut options = verify_shared::options((cap, settings.scratch_dir()), surface, level);
+    // Damage is found by the verification itself.
+    let total = store.subdomains().map_or(0, |rows| rows.iter().map(|row| row.tets).sum());
+    let (listener, seen) = (settings.clone(), AtomicU64::new(0));
+    options.progress = Some(Arc::new(move |n| {
+        let done = seen.fetch_add(n, Ordering::Relaxed) + n;
+        listener.count("verify", done, total, "tetrahedra");
+    }));
     let verified = attempt(|| verify_shared::verify(store, settings, surface, &options));
     let error = match verified.map_err(StoreError::from) {
         Ok(Ok(report)) => return Ok(report),

@@ -39,7 +39,7 @@ pub(super) fn options(
 ) -> VerifyOptions {
     let held = surface.map_or(0, |s| s.bytes() as u64 + audit::wire_bytes(s));
     let memory = cap.saturating_sub(held).min(1 << 30) / 2;
-    VerifyOptions { level, memory_bytes: memory as usize, temp_dir }
+    VerifyOptions::new(level, memory as usize, temp_dir)
 }
 
 /// Memory for each thread that verifies sub-domains. A second thread took 24 to 66 MiB when memory was not short.
@@ -95,7 +95,13 @@ pub(super) fn verify(
         };
         let each = |slot, row: &SubdomainRow| {
             let answer = pool.as_ref().and_then(|pool| ask(&**pool, slot, row).ok());
-            answer.map_or_else(|| here(slot % n_threads, row), Ok)
+            let Some(answer) = answer else {
+                return here(slot % n_threads, row);
+            };
+            if let Some(progress) = &own_options.progress {
+                progress(row.tets);
+            }
+            Ok(answer)
         };
         share(rows, [n_threads, slots], &here, &each, add)
     })

@@ -216,6 +216,9 @@ impl<'a> Audit<'a> {
             if self.level(Level::Adjacency) {
                 self.pair(rank, &summary, tets, &corners, &marks, &mut open)?;
             }
+            if let Some(progress) = &self.options.progress {
+                progress(tets.len() as u64);
+            }
         }
         let total = part.row().tets;
         counted(part, "tetrahedra", u64::from(expected), total)?;

@@ -118,7 +118,7 @@ fn verified(draft: &Draft, level: Level) -> Result<Report, StoreError> {
     let mut store = Catalog::open(&path)?;
     let [tets, faces] = digest(&mut store, 1 << 20)?;
     assert_eq!([tets, faces], store.digest()?);
-    let options = VerifyOptions { level, memory_bytes: 4 << 20, temp_dir: dir.path().to_owned() };
+    let options = VerifyOptions::new(level, 4 << 20, dir.path().to_owned());
     let report = verify(&mut store, Some(&draft.surface), &options)?;
     assert_eq!(report.digest, tets.to_string());
     let surface = Some(&draft.surface);
@@ -199,11 +199,7 @@ fn two_subdomains_verify_and_a_changed_interface_is_found() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("two.tetdb");
     crate::store::two_subdomains(&path)?;
-    let options = VerifyOptions {
-        level: Level::Delaunay,
-        memory_bytes: 4 << 20,
-        temp_dir: dir.path().to_owned(),
-    };
+    let options = VerifyOptions::new(Level::Delaunay, 4 << 20, dir.path().to_owned());
     let report = verify(&mut Catalog::open(&path)?, None, &options)?;
     assert!(report.valid, "{report:?}");
     assert_eq!((report.subdomains, report.interface_faces), (2, 2));
@@ -235,11 +231,7 @@ fn every_row_that_was_changed_is_found() -> Outcome {
         |_, topology| topology[0].neighbors.clear(),
     ];
     let dir = tempfile::tempdir()?;
-    let options = VerifyOptions {
-        level: Level::Topology,
-        memory_bytes: 4 << 20,
-        temp_dir: dir.path().to_owned(),
-    };
+    let options = VerifyOptions::new(Level::Topology, 4 << 20, dir.path().to_owned());
     for (i, change) in changes.into_iter().enumerate() {
         let path = dir.path().join(format!("{i}.tetdb"));
         crate::store::two_subdomains(&path)?;
