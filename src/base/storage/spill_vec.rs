@@ -166,6 +166,22 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
+    /// All elements, if they are in memory.
+    pub fn as_slice(&self) -> Option<&[T]> {
+        match &self.place {
+            Residence::Memory(all) => Some(all),
+            Residence::Disk(_) => None,
+        }
+    }
+
+    /// All elements, if they are in memory.
+    pub fn as_mut_slice(&mut self) -> Option<&mut [T]> {
+        match &mut self.place {
+            Residence::Memory(all) => Some(all),
+            Residence::Disk(_) => None,
+        }
+    }
+
     /// The array for reading by many threads.
     pub fn freeze(self) -> FrozenSpillVec<T> {
         match self.place {

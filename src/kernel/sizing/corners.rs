@@ -14,11 +14,13 @@ use rayon::prelude::*;
 use super::SizingError;
 use super::tree::{LATTICE, Leaf, Tree};
 use tetdb_base::storage::{
-    KeyedId, OrRaise, ScratchSpace, SpillVec, StorageError, parallel, sort_record,
+    KeyedId, OrRaise, ScratchSpace, SortRecord, SpillVec, StorageError, parallel, sort_record,
 };
 
 /// Corners sampled in one batch.
 const CORNERS_AT_ONCE: usize = 1 << 16;
+/// Leaves whose corners a thread looks at before the next ones.
+const LEAVES_AT_ONCE: usize = 1 << 12;
 
 sort_record! {
     /// A hanging corner and the four corners (an edge's two, twice) whose mean it takes.
@@ -106,12 +108,20 @@ fn number_corners(
     scratch: &ScratchSpace,
 ) -> Result<(SpillVec<[u32; 8]>, usize), StorageError> {
     let mut keys = scratch.sorter::<KeyedId>();
+    let mut leaves = (0..).zip(tree.leaves());
     let mut n_leaves = 0;
-    for (i, leaf) in tree.leaves().enumerate() {
-        n_leaves += 1;
-        for c in 0..8 {
-            keys.push(KeyedId { key: morton(leaf.corner(c)), id: (8 * i + c) as u32 })?;
+    loop {
+        let some: Vec<(usize, Leaf)> = leaves.by_ref().take(LEAVES_AT_ONCE).collect();
+        if some.is_empty() {
+            break;
         }
+        n_leaves += some.len();
+        let key = |(i, leaf): &(usize, Leaf), c: usize| {
+            KeyedId { key: morton(leaf.corner(c)), id: (8 * i + c) as u32 }.to_bytes()
+        };
+        let of = |leaf: &(usize, Leaf)| std::array::from_fn::<_, 8, _>(|c| key(leaf, c));
+        let found: Vec<_> = parallel(|| some.par_iter().map(of).collect());
+        keys.extend(found.as_flattened())?;
     }
     let keys = keys.finish()?;
     let mut of_leaf = scratch.vec(n_leaves, [0u32; 8]);
@@ -149,18 +159,21 @@ fn find_hanging(
     scratch: &ScratchSpace,
 ) -> Result<SpillVec<Hanging>, StorageError> {
     let mut found = scratch.sorter::<Hanging>();
-    for (i, leaf) in tree.leaves().enumerate() {
-        let ids = of_leaf.get(i);
-        for cell in leaf.outer_neighbors() {
-            let Some((large, larger)) = larger_leaf(tree, &leaf, cell) else {
-                continue;
-            };
-            let ids_large = of_leaf.get(larger as usize);
-            for (c, &id) in ids.iter().enumerate() {
-                if let Some(hanging) = hangs(&leaf, c, id, &large, &ids_large) {
-                    found.push(hanging)?;
-                }
+    let mut leaves = (0..).zip(tree.leaves());
+    loop {
+        let some: Vec<(usize, Leaf)> = leaves.by_ref().take(CORNERS_AT_ONCE).collect();
+        if some.is_empty() {
+            break;
+        }
+        let found_now = match of_leaf.as_slice() {
+            Some(all) => {
+                let of = |some: &[(usize, Leaf)]| hanging_of(tree, some, |i| all[i]);
+                parallel(|| some.par_chunks(LEAVES_AT_ONCE).map(of).collect())
             }
+            None => vec![hanging_of(tree, &some, |i| of_leaf.get(i))],
+        };
+        for hanging in found_now.into_iter().flatten() {
+            found.push(hanging)?;
         }
     }
     let mut hanging = scratch.builder();
@@ -173,6 +186,30 @@ fn find_hanging(
         }
     }
     Ok(hanging.finish())
+}
+
+/// The corners of some leaves that hang on larger ones beside them, each once.
+fn hanging_of(
+    tree: &Tree,
+    leaves: &[(usize, Leaf)],
+    mut of_leaf: impl FnMut(usize) -> [u32; 8],
+) -> Vec<Hanging> {
+    let mut found = Vec::new();
+    for (i, leaf) in leaves {
+        let mut ids = None;
+        for cell in leaf.outer_neighbors() {
+            let Some((large, larger)) = larger_leaf(tree, leaf, cell) else {
+                continue;
+            };
+            let ids = *ids.get_or_insert_with(|| of_leaf(*i));
+            let ids_large = of_leaf(larger as usize);
+            let hanging = |(c, &id): (usize, &u32)| hangs(leaf, c, id, &large, &ids_large);
+            found.extend(ids.iter().enumerate().filter_map(hanging));
+        }
+    }
+    found.sort_unstable_by_key(|h| (h.level, h.corner, h.on));
+    found.dedup_by_key(|h| (h.level, h.corner));
+    found
 }
 
 /// The leaf at a neighboring cell, when it is larger.

@@ -127,9 +127,11 @@ impl SizeField {
             beta: scaled.beta,
             slope_factor: None,
             scratch,
+            parts: None,
         };
         sizes.gather_slope_factors();
         let h = sizes.values(&scaled, &constraints)?;
+        drop(sizes);
         let field = Self::from_corners(frame, targets.beta, tree, corners, h, scratch)
             .with_sources(options, bounds.diagonal())?;
         let summary = field.summary(&seeds, &targets, options, &list, scratch);

@@ -2,9 +2,11 @@
 
 use fixedbitset::FixedBitSet;
 
-use super::corners::{PAIRS, TreeCorners};
-use super::tree::{Leaf, Tree};
-use tetdb_base::storage::{SpillVec, check_cancelled};
+use rayon::prelude::*;
+
+use super::corners::{Hanging, TreeCorners};
+use super::parts::{CornerParts, OfLeaves, PartLeaves, PartWork};
+use tetdb_base::storage::{SpillVec, parallel};
 
 /// Rounds of grading and closing hanging corners. The last ones change little; each costs as much as
 /// the first.
@@ -12,28 +14,45 @@ const GRADE_ROUNDS: u32 = 4;
 /// A hanging corner's mean may exceed its graded value by this factor. The slope bound is stated with more slack; at
 /// 1.001 every round finds something left to lower.
 const EXCESS_MAX: f32 = 1.01;
+
+/// Hanging corners whose means are computed before they are set.
+const MEANS_AT_ONCE: usize = 1 << 18;
+
 /// Gives hanging corners their means, where these are known.
 pub(super) fn close_finite(corners: &mut TreeCorners, h: &mut SpillVec<f32>) {
-    for k in 0..corners.hanging.len() {
-        let hanging = corners.hanging.get(k);
-        let mean = mean_on(hanging.on, h);
+    let hanging = &mut corners.hanging;
+    if let (Some(all), Some(h)) = (hanging.as_slice(), h.as_mut_slice()) {
+        // No corner hangs on one of its own level.
+        for some in all.chunk_by(|a, b| a.level == b.level).flat_map(|l| l.chunks(MEANS_AT_ONCE)) {
+            let mean = |hanging: &Hanging| mean_on(hanging.on, |on| h[on]);
+            let means: Vec<f32> =
+                parallel(|| some.par_iter().with_min_len(4096).map(mean).collect());
+            for (hanging, mean) in some.iter().zip(means).filter(|(_, mean)| mean.is_finite()) {
+                h[hanging.corner as usize] = mean;
+            }
+        }
+        return;
+    }
+    for k in 0..hanging.len() {
+        let hanging = hanging.get(k);
+        let mean = mean_on(hanging.on, |on| h.get(on));
         if mean.is_finite() {
             h.set(hanging.corner as usize, mean);
         }
     }
 }
 
-fn mean_on(on: [u32; 4], h: &mut SpillVec<f32>) -> f32 {
-    let mut sum = f64::from(h.get(on[0] as usize));
+fn mean_on(on: [u32; 4], mut h: impl FnMut(usize) -> f32) -> f32 {
+    let mut sum = f64::from(h(on[0] as usize));
     for &v in &on[1..] {
-        sum += f64::from(h.get(v as usize));
+        sum += f64::from(h(v as usize));
     }
     (sum * 0.25) as f32
 }
 
 /// The slope bound between corners of the same leaf.
 pub(super) struct Grading<'a> {
-    pub tree: &'a Tree,
+    pub parts: &'a mut CornerParts,
     pub corners: &'a mut TreeCorners,
     pub beta: f64,
     /// By leaf, how many times `beta` its slope may be; once where it is not given.
@@ -43,36 +62,11 @@ pub(super) struct Grading<'a> {
 impl Grading<'_> {
     /// Lowers values until no two corners of a leaf differ by more than the slope allows.
     ///
-    /// The result is the largest such function below the given values, in any order. Sweeps go forward and backward by
-    /// turns, because a lowered value travels along with the sweep of its direction.
+    /// The result is the largest such function below the given values, in any order.
     pub fn grade(&mut self, h: &mut SpillVec<f32>) {
-        // Corners that were lowered since their neighbors were last checked.
-        let mut changed = FixedBitSet::with_capacity(h.len());
-        changed.insert_range(..);
-        let mut next = FixedBitSet::with_capacity(h.len());
-        let mut is_backward = false;
-        loop {
-            check_cancelled();
-            let mut sweep = Sweep {
-                of_leaf: &mut self.corners.of_leaf,
-                slope_factor: self.slope_factor.as_deref_mut(),
-                h,
-                changed: &mut changed,
-                next: &mut next,
-                beta: self.beta,
-                is_done: true,
-            };
-            match is_backward {
-                true => (self.tree.leaves_backward()).for_each(|(i, leaf)| sweep.relax(i, leaf)),
-                false => (0..).zip(self.tree.leaves()).for_each(|(i, leaf)| sweep.relax(i, leaf)),
-            }
-            if sweep.is_done {
-                break;
-            }
-            std::mem::swap(&mut changed, &mut next);
-            next.clear();
-            is_backward = !is_backward;
-        }
+        let slope_factor = self.slope_factor.as_deref_mut();
+        let of = OfLeaves { ids: &mut self.corners.of_leaf, slope_factor };
+        self.parts.settle(of, h, &Slope { beta: self.beta });
     }
 
     /// Grades, and gives hanging corners their means: lowering only, so that both hold in the end.
@@ -86,7 +80,7 @@ impl Grading<'_> {
             for k in (0..self.corners.hanging.len()).rev() {
                 let hanging = self.corners.hanging.get(k);
                 let own = h.get(hanging.corner as usize);
-                if mean_on(hanging.on, h) > own * EXCESS_MAX {
+                if mean_on(hanging.on, |on| h.get(on)) > own * EXCESS_MAX {
                     changed = true;
                     let level = level_for_mean(hanging.distinct(), h, own);
                     for &on in hanging.distinct() {
@@ -102,72 +96,88 @@ impl Grading<'_> {
     }
 }
 
-/// One way through all leaves.
-struct Sweep<'a> {
-    of_leaf: &'a mut SpillVec<[u32; 8]>,
-    slope_factor: Option<&'a mut SpillVec<f32>>,
-    h: &'a mut SpillVec<f32>,
-    changed: &'a mut FixedBitSet,
-    next: &'a mut FixedBitSet,
+/// Lowers the values of a part as far as those around it ask for.
+struct Slope {
     beta: f64,
-    is_done: bool,
 }
 
-impl Sweep<'_> {
-    #[inline]
-    fn relax(&mut self, number: u32, leaf: Leaf) {
-        let ids = self.of_leaf.get(number as usize);
-        if !ids.iter().any(|&id| self.changed.contains(id as usize)) {
-            return;
-        }
-        let mut before = [0.0; 8];
-        for (h, &id) in before.iter_mut().zip(&ids) {
-            *h = self.h.get(id as usize);
-        }
-        let mut h = before;
-        let slope_factor = match &mut self.slope_factor {
-            Some(by_leaf) => f64::from(by_leaf.get(number as usize)),
-            None => 1.0,
-        };
-        let step = self.beta * leaf.side() * slope_factor;
-        // Largest differences, by squared distance of corners in sides.
-        let steps = [0.0, step, step * 2f64.sqrt(), step * 3f64.sqrt()];
-        while relax_once(&mut h, &steps) {}
-        if h == before {
-            return;
-        }
-        self.is_done = false;
-        for ((id, h), before) in ids.into_iter().zip(h).zip(before) {
-            if h != before {
-                self.h.set(id as usize, h);
-                self.changed.insert(id as usize);
-                self.next.insert(id as usize);
+impl PartWork for Slope {
+    /// Sweeps go forward and backward by turns, because a lowered value travels along with the sweep of its direction.
+    fn run(
+        &self,
+        leaves: &PartLeaves,
+        first: usize,
+        h: &mut impl FnMut(usize) -> f32,
+        own: &mut [f32],
+    ) -> bool {
+        let n = leaves.len();
+        // Corners that were lowered since their neighbors were last checked.
+        let mut changed = FixedBitSet::with_capacity(own.len());
+        let mut next = FixedBitSet::with_capacity(own.len());
+        for sweep in 0.. {
+            let mut is_done = true;
+            for k in 0..n {
+                let k = if sweep % 2 == 0 { k } else { n - 1 - k };
+                let ids = leaves.ids(k);
+                let places = ids.map(|id| (id as usize).wrapping_sub(first));
+                let is_due = match sweep {
+                    0 => !leaves.is_again || places.iter().any(|&place| place >= own.len()),
+                    _ => places.iter().any(|&place| changed.contains(place)),
+                };
+                if !is_due {
+                    continue;
+                }
+                let mut before = [0.0; 8];
+                for ((value, place), id) in before.iter_mut().zip(places).zip(ids) {
+                    *value = own.get(place).copied().unwrap_or_else(|| h(id as usize));
+                }
+                let mut lowered = before;
+                let step = self.beta * leaves.side(k) * leaves.slope_factor(k);
+                let steps = [0.0, step, step * 2f64.sqrt(), step * 3f64.sqrt()];
+                relax(&mut lowered, &steps);
+                for ((place, value), before) in places.into_iter().zip(lowered).zip(before) {
+                    if value != before && place < own.len() {
+                        own[place] = value;
+                        changed.insert(place);
+                        next.insert(place);
+                        is_done = false;
+                    }
+                }
             }
+            if is_done {
+                return sweep > 0;
+            }
+            std::mem::swap(&mut changed, &mut next);
+            next.clear();
         }
+        false
     }
 }
 
-/// Lowers each of a leaf's values to the bound of the others; returns whether one changed.
+/// Lowers a leaf's values to the bounds of the others; `steps` are the largest differences by squared distance of corners in sides.
+///
+/// From the least value upwards, so that each is final when it bounds others.
 #[inline]
-fn relax_once(h: &mut [f32; 8], steps: &[f64; 4]) -> bool {
-    let (low, high) =
-        (h.iter()).fold((f32::INFINITY, f32::NEG_INFINITY), |(l, u), &x| (l.min(x), u.max(x)));
-    // The least step from the least value allows the greatest.
-    if bound(low, steps[1]) >= high {
-        return false;
-    }
-    let mut is_changed = false;
-    for &(a, b, distance2) in &PAIRS {
-        let (a, b) = (a as usize, b as usize);
-        for (from, to) in [(a, b), (b, a)] {
-            let most = bound(h[from], steps[distance2 as usize]);
-            if most < h[to] {
-                h[to] = most;
-                is_changed = true;
+fn relax(h: &mut [f32; 8], steps: &[f64; 4]) {
+    let mut is_left = [true; 8];
+    loop {
+        let (mut least, mut from, mut most) = (f32::INFINITY, 0, f32::NEG_INFINITY);
+        for (corner, &value) in h.iter().enumerate() {
+            if is_left[corner] && value < least {
+                (least, from) = (value, corner);
             }
+            most = most.max(value);
+        }
+        // The least step from the least value allows the greatest.
+        if bound(least, steps[1]) >= most {
+            return;
+        }
+        is_left[from] = false;
+        let bounds = steps.map(|step| bound(least, step));
+        for (corner, value) in h.iter_mut().enumerate() {
+            *value = value.min(bounds[(corner ^ from).count_ones() as usize]);
         }
     }
-    is_changed
 }
 
 /// The level at which to cut the values of some corners so that their mean becomes `wanted`, which is
@@ -192,4 +202,57 @@ fn level_for_mean(on: &[u32], h: &mut SpillVec<f32>, wanted: f32) -> f32 {
 /// The largest value allowed at a step from `value`.
 pub(super) fn bound(value: f32, step: f64) -> f32 {
     (f64::from(value) + step) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tree::Tree;
+    use super::*;
+    use tetdb_base::storage::ScratchSpace;
+
+    /// A tree with small leaves around one diagonal.
+    fn tree() -> Tree {
+        fn shape(depth: u32, is_beside: bool, list: &mut Vec<bool>) {
+            list.push(depth < 2 || depth < 7 && is_beside);
+            if list.last() == Some(&true) {
+                (0..8).for_each(|o| shape(depth + 1, is_beside && [0, 3, 7].contains(&o), list));
+            }
+        }
+        let mut list = Vec::new();
+        shape(0, true, &mut list);
+        Tree::from_shape(&list).numbered()
+    }
+
+    #[test]
+    fn parts_settle_where_sweeps_over_all_leaves_do() {
+        let tree = tree();
+        let dir = tempfile::tempdir().expect("a folder");
+        for scratch in [ScratchSpace::boundless(), ScratchSpace::new(1 << 16, dir.path())] {
+            let mut corners = TreeCorners::new(&tree, &scratch);
+            let mut parts = CornerParts::new(&tree, &mut corners, &scratch, |_| true);
+            let wild = |i: usize| ((i * 7919 % 1009) as f32 / 100.0).exp() - 2.0;
+            let mut h = scratch.vec(corners.n_corners, 0.0f32);
+            (0..h.len()).for_each(|i| h.set(i, wild(i)));
+            let mut expected: Vec<f32> = (0..h.len()).map(wild).collect();
+            let beta = 0.3;
+            let mut is_done = false;
+            while !std::mem::replace(&mut is_done, true) {
+                for (i, leaf) in tree.leaves().enumerate() {
+                    let ids = corners.of_leaf.get(i).map(|id| id as usize);
+                    for (a, b) in (0..64usize).map(|k| (k / 8, k % 8)).filter(|(a, b)| a != b) {
+                        let step = beta * leaf.side() * f64::from((a ^ b).count_ones()).sqrt();
+                        let most = bound(expected[ids[a]], step);
+                        if most < expected[ids[b]] {
+                            expected[ids[b]] = most;
+                            is_done = false;
+                        }
+                    }
+                }
+            }
+            let corners = &mut corners;
+            Grading { parts: &mut parts, corners, beta, slope_factor: None }.grade(&mut h);
+            assert!(expected.len() > 5_000, "{}", expected.len());
+            assert!((0..h.len()).all(|i| h.get(i) == expected[i]));
+        }
+    }
 }

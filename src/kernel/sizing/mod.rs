@@ -38,6 +38,7 @@ mod label;
 mod length;
 mod math;
 mod options;
+mod parts;
 mod region;
 mod remesh;
 mod seeds;

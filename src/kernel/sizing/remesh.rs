@@ -87,6 +87,7 @@ impl SizeField {
             beta,
             slope_factor: Some(slope_factor),
             scratch,
+            parts: None,
         };
         let (mut at_skin, nearest) = sizes.gather(|seeds, v| seeds.h(v));
         for i in 0..at_skin.len() {
@@ -104,6 +105,7 @@ impl SizeField {
             h.set(i, wanted.max(low).min(high));
         }
         sizes.grading().grade_closed(&mut h);
+        drop(sizes);
         Ok(Some(Self::from_corners(frame, beta, tree, corners, h, scratch)))
     }
 

@@ -162,18 +162,12 @@ impl Tree {
 
     /// All cells, depth first, each before its children; of a leaf its number.
     pub fn cells(&self) -> Cells<'_> {
-        Cells { tree: self, stack: vec![(self.root, Leaf::ROOT)], is_backward: false }
+        Cells { tree: self, stack: vec![(self.root, Leaf::ROOT)] }
     }
 
     /// All leaves, depth first: in the order of their numbers, once they are numbered.
     pub fn leaves(&self) -> impl Iterator<Item = Leaf> {
         self.cells().filter_map(|(number, leaf)| number.map(|_| leaf))
-    }
-
-    /// All leaves with their numbers, from the last to the first.
-    pub fn leaves_backward(&self) -> impl Iterator<Item = (u32, Leaf)> {
-        let cells = Cells { is_backward: true, ..self.cells() };
-        cells.filter_map(|(number, leaf)| Some((number?, leaf)))
     }
 
     /// Divides leaves until neighbors differ by one level at most, from the deepest level up.
@@ -220,7 +214,7 @@ impl Tree {
     }
 
     /// The same tree with blocks and leaves numbered depth first.
-    fn numbered(&self) -> Self {
+    pub fn numbered(&self) -> Self {
         fn copy(from: &Tree, entry: u32, to: &mut Tree, n_leaves: &mut u32) -> u32 {
             if entry & LEAF != 0 {
                 *n_leaves += 1;
@@ -244,7 +238,6 @@ impl Tree {
 pub(super) struct Cells<'a> {
     tree: &'a Tree,
     stack: Vec<(u32, Leaf)>,
-    is_backward: bool,
 }
 
 impl Iterator for Cells<'_> {
@@ -256,11 +249,7 @@ impl Iterator for Cells<'_> {
             return Some((Some(entry & !LEAF), cell));
         }
         let block = &self.tree.blocks[entry as usize];
-        let child = |o: usize| (block[o], cell.child(o));
-        match self.is_backward {
-            true => self.stack.extend((0..8).map(child)),
-            false => self.stack.extend((0..8).rev().map(child)),
-        }
+        self.stack.extend((0..8).rev().map(|o| (block[o], cell.child(o))));
         Some((None, cell))
     }
 }
@@ -307,21 +296,47 @@ fn shape_of(
     if !is_divided(cell, near, n_around, seeds, targets) {
         return vec![false];
     }
-    let part = |octant: usize| {
-        let child = cell.child(octant);
-        let list = near_child(child, near, seeds);
+    let part = |(octant, list): (usize, Option<Vec<u32>>)| {
         let inner = list.as_deref().unwrap_or(near);
-        shape_of(child, inner, near.len(), seeds, targets)
+        shape_of(cell.child(octant), inner, near.len(), seeds, targets)
     };
-    // Long lists one after the other, or all parts would be held at once.
-    let parts: Vec<Vec<bool>> = if (PARALLEL_SEEDS..PARALLEL_SEEDS_MAX).contains(&near.len()) {
-        parallel(|| (0..8).into_par_iter().map(part).collect())
+    let parts: Vec<Vec<bool>> = if near.len() >= PARALLEL_SEEDS_MAX {
+        // One after the other, or all parts would be held at once.
+        (0..8).map(|o| part((o, near_child(cell.child(o), near, seeds)))).collect()
     } else {
-        (0..8).map(part).collect()
+        let lists = near_children(cell, near, seeds);
+        if near.len() >= PARALLEL_SEEDS {
+            let lists: Vec<_> = lists.into_iter().enumerate().collect();
+            parallel(|| lists.into_par_iter().map(part).collect())
+        } else {
+            lists.into_iter().enumerate().map(part).collect()
+        }
     };
     let mut shape = vec![true];
     parts.iter().for_each(|part| shape.extend(part));
     shape
+}
+
+/// Seeds in each child or half its side around it; none where all those of `near` are.
+fn near_children(cell: Leaf, near: &[u32], seeds: &Seeds) -> [Option<Vec<u32>>; 8] {
+    let side = 0.5 * cell.side();
+    // Along each axis, of the lower and the upper children.
+    let ranges = [cell.child(0), cell.child(7)].map(|child| {
+        let low = child.low() - Point::splat(0.5 * side);
+        (low, low + Point::splat(2.0 * side))
+    });
+    let mut lists: [Vec<u32>; 8] = Default::default();
+    for &s in near {
+        let p = seeds.at(s);
+        let [lower, upper] =
+            ranges.map(|(low, high)| (p.cmpge(low) & p.cmple(high)).bitmask() as usize);
+        for (octant, list) in lists.iter_mut().enumerate() {
+            if (upper & octant) | (lower & !octant & 7) == 7 {
+                list.push(s);
+            }
+        }
+    }
+    lists.map(|list| (list.len() < near.len()).then_some(list))
 }
 
 /// Seeds in a cell or half its side around it; none where all those of `near` are.
@@ -333,10 +348,8 @@ fn near_child(cell: Leaf, near: &[u32], seeds: &Seeds) -> Option<Vec<u32>> {
         let p = seeds.at(*s);
         p.cmpge(low).all() && p.cmple(high).all()
     };
-    // The capacity covers all seeds, and most of it stays untouched: a growing list takes up to three times its bytes.
-    let mut list = Vec::with_capacity(near.len());
-    list.extend(near.iter().copied().filter(is_near));
-    list.shrink_to_fit();
+    let some = |some: &[u32]| some.iter().copied().filter(is_near).collect::<Vec<u32>>();
+    let list = parallel(|| near.par_chunks(PARALLEL_SEEDS).map(some).collect::<Vec<_>>()).concat();
     (list.len() < near.len()).then_some(list)
 }
 

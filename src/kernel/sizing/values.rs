@@ -7,6 +7,7 @@ use super::constraints::SizeConstraints;
 use super::corners::TreeCorners;
 use super::grading::{Grading, bound, close_finite};
 use super::options::Targets;
+use super::parts::{CornerParts, OfLeaves, PartLeaves, PartWork};
 use super::seeds::Seeds;
 use super::tree::{LATTICE, Leaf, Tree};
 use tetdb_base::geom::Point;
@@ -41,6 +42,8 @@ pub(super) struct CornerSizes<'a> {
     /// By leaf, how many times `beta` its slope may be; once where it is not given.
     pub slope_factor: Option<SpillVec<f32>>,
     pub scratch: &'a ScratchSpace,
+    /// All leaves, once they were needed.
+    pub parts: Option<CornerParts>,
 }
 
 impl CornerSizes<'_> {
@@ -150,19 +153,11 @@ impl CornerSizes<'_> {
                 is_open.insert(i);
             }
         }
-        // Leaves with a corner to fill, as (leaf, weight): a cell's edge conducts as its width.
-        let mut open = self.scratch.builder::<[u32; 2]>();
-        for (i, leaf) in self.tree.leaves().enumerate() {
-            let ids = self.corners.of_leaf.get(i);
-            if ids.iter().any(|&c| is_open.contains(c as usize)) {
-                open.push([i as u32, (leaf.side() as f32).to_bits()]);
-            }
-        }
-        let mut open = open.finish();
+        let is_due = |ids: &[u32; 8]| ids.iter().any(|&c| is_open.contains(c as usize));
+        let mut open = CornerParts::new(self.tree, self.corners, self.scratch, is_due);
         if open.is_empty() {
             return h;
         }
-        let mut sums = self.scratch.vec(h.len(), [0.0f32; 2]);
         // Values of the round before.
         let mut before = self.scratch.vec(h.len(), 0.0f32);
         let (mut smooth, mut over) = (0, 1.0);
@@ -173,40 +168,20 @@ impl CornerSizes<'_> {
                 1 => 1.0 / (1.0 - 0.5 * SLOWEST * SLOWEST),
                 _ => 1.0 / (1.0 - 0.25 * SLOWEST * SLOWEST * over),
             };
-            sums.fill([0.0; 2]);
-            for k in 0..open.len() {
-                let [leaf, weight] = open.get(k);
-                let ids = self.corners.of_leaf.get(leaf as usize);
-                average(&ids, f32::from_bits(weight), &is_open, &mut h, &mut sums);
-            }
-            let mut complete = true;
-            for i in 0..h.len() {
-                if is_open.contains(i) {
-                    let [sum, weight] = sums.get(i);
-                    if weight > 0.0 {
-                        let (old, older) = (h.get(i), before.get(i));
-                        complete &= old.is_finite();
-                        before.set(i, old);
-                        let mean = sum / weight;
-                        // Next to steep steps, and at corners that hang between others, extrapolation would run away,
-                        // even below zero.
-                        let next = match over > 1.0 {
-                            true => older + over * (mean - older),
-                            false => mean,
-                        };
-                        h.set(i, next.clamp(mean / REACH, mean * REACH));
-                    }
-                }
-            }
+            let of = OfLeaves { ids: &mut self.corners.of_leaf, slope_factor: None };
+            let reached =
+                open.change(of, &mut h, &mut before, &Average { is_open: &is_open, over });
+            std::mem::swap(&mut h, &mut before);
             close_finite(self.corners, &mut h);
-            smooth += u32::from(complete);
+            smooth += u32::from(!reached);
         }
         h
     }
 
     pub fn grading(&mut self) -> Grading<'_> {
+        let all = || CornerParts::new(self.tree, self.corners, self.scratch, |_| true);
         Grading {
-            tree: self.tree,
+            parts: self.parts.get_or_insert_with(all),
             corners: self.corners,
             beta: self.beta,
             slope_factor: self.slope_factor.as_mut(),
@@ -258,31 +233,59 @@ impl CornerSizes<'_> {
     }
 }
 
-/// Adds the contributions of a leaf's twelve edges to the sums at its open corners.
-#[inline(always)]
-fn average(
-    ids: &[u32; 8],
-    weight: f32,
-    is_open: &FixedBitSet,
-    h: &mut SpillVec<f32>,
-    sums: &mut SpillVec<[f32; 2]>,
-) {
-    let mut values = [0.0; 8];
-    for (value, &id) in values.iter_mut().zip(ids) {
-        *value = h.get(id as usize);
-    }
-    for (&id, along) in ids.iter().zip(ALONG_EDGES) {
-        if !is_open.contains(id as usize) {
-            continue;
-        }
-        sums.change(id as usize, |sum| {
-            for corner in along {
-                let value = values[corner as usize];
-                if value.is_finite() {
-                    *sum = [sum[0] + weight * value, sum[1] + weight];
+/// One round of averaging: from values and those of the round before to the next.
+struct Average<'a> {
+    is_open: &'a FixedBitSet,
+    over: f32,
+}
+
+impl PartWork for Average<'_> {
+    /// Returns whether a corner got its first value.
+    fn run(
+        &self,
+        leaves: &PartLeaves,
+        first: usize,
+        h: &mut impl FnMut(usize) -> f32,
+        own: &mut [f32],
+    ) -> bool {
+        let mut sums = vec![[0.0f32; 2]; own.len()];
+        for k in 0..leaves.len() {
+            let ids = leaves.ids(k);
+            // A cell's edge conducts as its width.
+            let weight = leaves.side(k) as f32;
+            let mut values = [0.0; 8];
+            for (value, &id) in values.iter_mut().zip(&ids) {
+                *value = weight * h(id as usize);
+            }
+            for (&id, along) in ids.iter().zip(ALONG_EDGES) {
+                let sum = sums.get_mut((id as usize).wrapping_sub(first));
+                if let Some(sum) = sum.filter(|_| self.is_open.contains(id as usize)) {
+                    for corner in along {
+                        let value = values[corner as usize];
+                        if value.is_finite() {
+                            *sum = [sum[0] + value, sum[1] + weight];
+                        }
+                    }
                 }
             }
-        });
+        }
+        let mut reached = false;
+        for ((i, before), [sum, weight]) in (first..).zip(own).zip(sums) {
+            let old = h(i);
+            let older = std::mem::replace(before, old);
+            if weight > 0.0 {
+                reached |= old.is_infinite();
+                let mean = sum / weight;
+                // Next to steep steps, and at corners that hang between others, extrapolation would run away, even below
+                // zero.
+                let next = match self.over > 1.0 {
+                    true => older + self.over * (mean - older),
+                    false => mean,
+                };
+                *before = next.clamp(mean / REACH, mean * REACH);
+            }
+        }
+        reached
     }
 }
 
