@@ -1,7 +1,6 @@
 //! Sizes that grow no steeper than the gradation allows.
 
 use fixedbitset::FixedBitSet;
-
 use rayon::prelude::*;
 
 use super::corners::{Hanging, TreeCorners};
@@ -14,7 +13,6 @@ const GRADE_ROUNDS: u32 = 4;
 /// A hanging corner's mean may exceed its graded value by this factor. The slope bound is stated with more slack; at
 /// 1.001 every round finds something left to lower.
 const EXCESS_MAX: f32 = 1.01;
-
 /// Hanging corners whose means are computed before they are set.
 const MEANS_AT_ONCE: usize = 1 << 18;
 
@@ -114,7 +112,8 @@ impl PartWork for Slope {
         // Corners that were lowered since their neighbors were last checked.
         let mut changed = FixedBitSet::with_capacity(own.len());
         let mut next = FixedBitSet::with_capacity(own.len());
-        for sweep in 0.. {
+        let mut sweep = 0u64;
+        loop {
             let mut is_done = true;
             for k in 0..n {
                 let k = if sweep % 2 == 0 { k } else { n - 1 - k };
@@ -149,8 +148,8 @@ impl PartWork for Slope {
             }
             std::mem::swap(&mut changed, &mut next);
             next.clear();
+            sweep += 1;
         }
-        false
     }
 }
 

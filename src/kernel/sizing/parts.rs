@@ -31,7 +31,7 @@ pub(super) struct CornerParts {
     n_corners: usize,
 }
 
-/// What is done with a part.
+/// Work on one part at a time.
 pub(super) trait PartWork: Sync {
     /// Changes the values of the corners from `first` on; `h` is any corner's value as it was. Returns whether there is more to do: for
     /// [`CornerParts::settle`] whether a value changed.
@@ -44,7 +44,7 @@ pub(super) trait PartWork: Sync {
     ) -> bool;
 }
 
-/// What is known of leaves.
+/// Records of all leaves.
 pub(super) struct OfLeaves<'a> {
     pub ids: &'a mut SpillVec<[u32; 8]>,
     /// How many times the gradation's slope each may have; once where it is not given.
