@@ -116,7 +116,7 @@ impl PartWork for Slope {
         loop {
             let mut is_done = true;
             for k in 0..n {
-                let k = if sweep % 2 == 0 { k } else { n - 1 - k };
+                let k = if sweep.is_multiple_of(2) { k } else { n - 1 - k };
                 let ids = leaves.ids(k);
                 let places = ids.map(|id| (id as usize).wrapping_sub(first));
                 let is_due = match sweep {
