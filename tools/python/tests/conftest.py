@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,6 +20,12 @@ RUNS = int(os.environ.get("TETDB_RUNS", "20"))
 SPEC = "balls,count=2,h=0.07"
 OPTIONS: dict[str, Any] = {"regions": "all", "hsiz": 0.048, "subdomains": 2}
 """A cube with two filled balls: about the least that is divided into two sub-domains."""
+
+
+@pytest.fixture(autouse=True)
+def interruptible() -> None:
+    # A process in the background of a shell ignores Ctrl-C, and after Gmsh's first call it ends the process.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

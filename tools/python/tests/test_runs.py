@@ -20,8 +20,6 @@ import tetdb
 
 
 def test_runs_cancelled_at_any_time_end_soon_and_go_on_to_the_same_mesh(tmp_path: Path, parts: tetdb.Store) -> None:
-    # What runs in the background of a shell ignores Ctrl-C from the beginning.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     surface = tetdb.sample(SPEC)
     begun = time.monotonic()
     tetdb.mesh(surface, tmp_path / "whole", threads=2, **OPTIONS)
