@@ -128,15 +128,29 @@ impl<'a> Seeker<'a> {
         best
     }
 
-    /// All triangles on the line through `p` along z, from below.
-    pub(super) fn on_line(&self, p: Point) -> Vec<Crossing> {
-        let mut all = Vec::new();
-        self.each_crossing(p, f64::NEG_INFINITY, |c| {
-            all.push(c);
-            f64::INFINITY
+    /// The triangles on the line through `p` along z, from one of them up to the first where `is_end` holds. If that one
+    /// is not on the line, from `p`.
+    pub(super) fn upward(
+        &self,
+        p: Point,
+        from: u32,
+        is_end: impl Fn(u32) -> bool,
+    ) -> Vec<Crossing> {
+        let low = self.crossing(from, p).map_or(p.z, |c| c.z);
+        let mut high = f64::INFINITY;
+        let mut found = Vec::new();
+        self.each_crossing(p, low, |c| {
+            if (low..=high).contains(&c.z) {
+                found.push(c);
+                if is_end(c.triangle) {
+                    high = c.z;
+                }
+            }
+            high
         });
-        all.sort_by(|a, b| a.z.total_cmp(&b.z).then(a.triangle.cmp(&b.triangle)));
-        all
+        found.retain(|c| c.z <= high);
+        found.sort_by(|a, b| a.z.total_cmp(&b.z).then(a.triangle.cmp(&b.triangle)));
+        found
     }
 
     /// Mean number of triangles tested per search, from some points: half of all for fans of long thin triangles,
@@ -153,8 +167,8 @@ impl<'a> Seeker<'a> {
         looked_at.sum::<usize>() as f64 / PROBES as f64
     }
 
-    /// Calls `visit` on the crossings in boxes from `low` up. `visit` returns the largest z of interest. Returns the
-    /// number of triangles tested.
+    /// Calls `visit` on the crossings in boxes from `low` up, about from below. `visit` returns the largest z of interest.
+    /// Returns the number of triangles tested.
     fn each_crossing(&self, p: Point, low: f64, mut visit: impl FnMut(Crossing) -> f64) -> usize {
         let mut high = f64::INFINITY;
         let mut n = 0;
@@ -170,14 +184,22 @@ impl<'a> Seeker<'a> {
                 || b.low.z > high
         };
         let mut stack = Vec::with_capacity(STACK);
-        stack.push((top, 0));
-        while let Some((level, node)) = stack.pop() {
-            if misses(&self.tree.levels[level].get(node), high) {
+        stack.push((top, 0, f64::NEG_INFINITY));
+        while let Some((level, node, bottom)) = stack.pop() {
+            if bottom > high {
                 continue;
             }
             if level > 0 {
-                let children = self.tree.children(level, node);
-                stack.extend(children.map(|c| (level - 1, c)));
+                let below = &self.tree.levels[level - 1];
+                let from = stack.len();
+                for child in self.tree.children(level, node) {
+                    let bounds = below.get(child);
+                    if !misses(&bounds, high) {
+                        stack.push((level - 1, child, bounds.low.z));
+                    }
+                }
+                // The lowest child is visited first.
+                stack[from..].sort_by(|a, b| b.2.total_cmp(&a.2).then(b.1.cmp(&a.1)));
                 continue;
             }
             for i in self.tree.members(node) {
@@ -203,9 +225,11 @@ impl<'a> Seeker<'a> {
             return None;
         }
         let sum = u.0 + v.0 + w.0;
+        // Rounded, a mean may lie outside the triangle's box.
+        let (least, most) = (a.z.min(b.z).min(c.z), a.z.max(b.z).max(c.z));
         let z = match sum == 0.0 {
-            true => a.z.max(b.z).max(c.z),
-            false => (u.0 * a.z + v.0 * b.z + w.0 * c.z) / sum,
+            true => most,
+            false => ((u.0 * a.z + v.0 * b.z + w.0 * c.z) / sum).clamp(least, most),
         };
         Some(Crossing { triangle, z, front_is_up })
     }

@@ -3,21 +3,26 @@
 //! ```text
 //!        \   t2        Around an edge the triangles follow each other by exact signs; between two of them
 //!   side  \  /          lies one volume. So sides that face each other are joined; what is left apart are
-//!          \/           shells, and a line along z through each shell joins the sides that see each other on it.
+//!          \/           shells, and a line along z up from each shell joins the sides that see each other on it.
 //!   t1 ----*            The side that sees nothing lies outside.
 //! ```
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
+use rayon::prelude::*;
+
 use super::Surface;
 use super::edges::{Facets, Groups, TriangleAtEdge};
-use super::seeker::Seeker;
+use super::seeker::{Crossing, Seeker};
 use crate::geom::{Point, orient_sign};
-use crate::storage::ScratchSpace;
+use crate::storage::{ScratchSpace, parallel};
 
 /// Bytes held for each triangle while volumes are identified: which sides see each other, which triangles hang together, which is left out.
 pub const VOLUMES_TRIANGLE: usize = 13;
+
+/// Shells from which threads look up before what they see is joined.
+const SHELLS_AT_ONCE: usize = 1 << 12;
 
 /// The number of the unbounded volume.
 pub const OUTSIDE: u32 = 0;
@@ -66,6 +71,10 @@ impl EnclosedVolumes {
                 shells.join(pair[0].triangle(), pair[1].triangle());
             }
         });
+        for &[a, b] in &facets.duplicates {
+            sides.join(2 * a, 2 * b);
+            sides.join(2 * a + 1, 2 * b + 1);
+        }
         for &[a, b] in &facets.two_sided {
             sides.join(2 * a, 2 * b + 1);
             sides.join(2 * a + 1, 2 * b);
@@ -75,24 +84,13 @@ impl EnclosedVolumes {
             sides.join(2 * t, 2 * t + 1);
         }
         let outside = 2 * n as u32;
-        let lines = lines(surface, &facets, &mut shells);
-        drop(shells);
-        for (line, t) in lines {
-            let crossings = seeker.on_line(line);
-            let mut below = outside;
-            for crossing in &crossings {
-                let [down, up] = crossing.sides();
-                sides.join(below, down);
-                below = up;
-            }
-            sides.join(below, outside);
-            // A sheet that is upright, or nearly, is on no line along z. It lies in the volume below the crossing above
-            // its middle.
-            if surface.is_sheet(t) && crossings.iter().all(|c| c.triangle != t) {
-                let above = crossings.iter().find(|c| c.z > line.z);
-                sides.join(2 * t, above.map_or(outside, |c| c.sides()[0]));
-            }
+        let shells = Shells::new(seeker, &facets, shells);
+        for some in shells.list.chunks(SHELLS_AT_ONCE) {
+            let of = |shell: &Shell| shells.seen_from(shell, outside);
+            let seen: Vec<_> = parallel(|| some.par_iter().map(of).collect());
+            seen.into_iter().flatten().for_each(|[below, above]| sides.join(below, above));
         }
+        drop(shells);
         let mut volumes = numbered(surface, sides);
         facets.each_edge(|uses| volumes.add_angles(surface, uses));
         volumes
@@ -243,22 +241,83 @@ fn sort_around(surface: &Surface, uses: &mut [TriangleAtEdge]) {
     });
 }
 
-/// For each shell the middle of the triangle that shows most from above, and that triangle.
-fn lines(surface: &Surface, facets: &Facets, shells: &mut Groups) -> Vec<(Point, u32)> {
-    let mut best: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
-    for t in (0..surface.n_triangles() as u32).filter(|&t| !facets.is_left_out[t as usize]) {
-        let [a, b, c] = surface.corners(t);
-        let area = (b - a).cross(c - a).z.abs();
-        let known = best.entry(shells.root(t)).or_insert((area, t));
-        if area > known.0 {
-            *known = (area, t);
+/// Triangles that hang together through edges.
+#[derive(Clone, Copy)]
+struct Shell {
+    /// The first of its triangles.
+    root: u32,
+    /// The triangle that shows most from above.
+    triangle: u32,
+    /// Its highest z.
+    top: f64,
+}
+
+/// All shells of a surface.
+struct Shells<'a> {
+    seeker: &'a Seeker<'a>,
+    /// By triangle.
+    is_left_out: &'a [bool],
+    /// By triangle its shell's first one.
+    roots: Vec<u32>,
+    /// By their first triangles.
+    list: Vec<Shell>,
+}
+
+impl<'a> Shells<'a> {
+    fn new(seeker: &'a Seeker<'a>, facets: &'a Facets, groups: Groups) -> Self {
+        let roots = groups.into_roots();
+        let mut best: BTreeMap<u32, (f64, Shell)> = BTreeMap::new();
+        for (triangle, &root) in (0u32..).zip(&roots) {
+            if facets.is_left_out[triangle as usize] {
+                continue;
+            }
+            let [a, b, c] = seeker.surface().corners(triangle);
+            let area = (b - a).cross(c - a).z.abs();
+            let top = a.z.max(b.z).max(c.z);
+            let (most, shell) = best.entry(root).or_insert((area, Shell { root, triangle, top }));
+            if area > *most {
+                (*most, shell.triangle) = (area, triangle);
+            }
+            shell.top = shell.top.max(top);
         }
+        let list = best.into_values().map(|(_, shell)| shell).collect();
+        Self { seeker, is_left_out: &facets.is_left_out, roots, list }
     }
-    let middle = |&(_, t): &(f64, u32)| {
+
+    /// Highest z of a triangle's shell.
+    fn top(&self, triangle: u32) -> f64 {
+        let root = self.roots[triangle as usize];
+        let found = self.list.binary_search_by_key(&root, |shell| shell.root);
+        found.map_or(f64::NEG_INFINITY, |i| self.list[i].top)
+    }
+
+    /// Sides that see each other on a line along z, from a shell up to the first one that reaches higher; past all shells
+    /// the outside.
+    ///
+    /// This joins all sides of each volume: on the line, the shell's own volume is left into the one around it, and what
+    /// follows is either the shell around that volume, which reaches higher; or a shell beside this one, which is passed if
+    /// it does not reach higher, with all that lies in it. So each shell is joined to the one around it or, by way of
+    /// higher and higher ones beside it, with one that is.
+    fn seen_from(&self, shell: &Shell, outside: u32) -> Vec<[u32; 2]> {
+        let (surface, t) = (self.seeker.surface(), shell.triangle);
         let [a, b, c] = surface.corners(t);
-        ((a + b + c) / 3.0, t)
-    };
-    best.values().map(middle).collect()
+        let middle = (a + b + c) / 3.0;
+        let is_end = |t: u32| !self.is_left_out[t as usize] && self.top(t) > shell.top;
+        let mut line = self.seeker.upward(middle, t, is_end);
+        line.retain(|c| !self.is_left_out[c.triangle as usize]);
+        let mut sides: Vec<u32> = line.iter().flat_map(Crossing::sides).collect();
+        if !line.iter().any(|c| is_end(c.triangle)) {
+            sides.push(outside);
+        }
+        // A sheet that is upright, or nearly, is on no line along z. It lies in the volume around its middle.
+        let is_upright = surface.is_sheet(t) && line.iter().all(|c| c.triangle != t);
+        if is_upright {
+            sides.insert(0, 2 * t);
+        }
+        // What is below the first crossing is not known.
+        let first = usize::from(!is_upright);
+        sides[first..].chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
+    }
 }
 
 /// The groups of sides with numbers, in the place of their roots: both at once would be the most that is held.
@@ -351,20 +410,83 @@ mod tests {
 
     #[test]
     fn shared_walls_part_volumes() {
-        // The second cube's wall at x = 1 is the first one's, so it is given from both sides; without it, from one.
-        let whole = cubes(&[([0.0; 3], 1.0, false), ([1.0, 0.0, 0.0], 1.0, false)]);
-        let mut single = whole.clone();
-        single.triangles.drain(12..14);
-        for surface in [whole, single] {
-            let seeker = Seeker::new(&surface);
-            let volumes = EnclosedVolumes::new(&seeker);
-            assert_eq!(volumes.n_volumes, 3);
-            let walls = volumes.walls();
-            let pairs: Vec<(u32, u32)> = walls.keys().copied().collect();
-            assert_eq!(pairs, [(0, 1), (0, 2), (1, 2)]);
-            assert_eq!(walls[&(0, 1)], Wall { front: 10, back: 0 });
-            for (x, volume) in [(0.5, 1), (1.5, 2), (2.5, 0), (-0.5, 0)] {
-                assert_eq!(volumes.at(&seeker, Point::new(x, 0.4, 0.3)), volume);
+        for axis in 0..3 {
+            let mut low = [0.0; 3];
+            low[axis] = 1.0;
+            // The second cube's wall at 1 is the first one's, so it is given from both sides; without it, from one.
+            let whole = cubes(&[([0.0; 3], 1.0, false), (low, 1.0, false)]);
+            let mut single = whole.clone();
+            let wall = |t: &[u32; 3]| t.iter().all(|&v| whole.points[v as usize][axis] == 1.0);
+            let second = 12 + whole.triangles[12..].iter().position(wall).expect("a wall");
+            single.triangles.drain(second..second + 2);
+            for surface in [&whole, &single] {
+                let seeker = Seeker::new(surface);
+                let volumes = EnclosedVolumes::new(&seeker);
+                assert_eq!(volumes.n_volumes, 3, "along {axis}");
+                let walls = volumes.walls();
+                let pairs: Vec<(u32, u32)> = walls.keys().copied().collect();
+                assert_eq!(pairs, [(0, 1), (0, 2), (1, 2)]);
+                assert_eq!(walls[&(0, 1)], Wall { front: 10, back: 0 });
+                for (along, volume) in [(0.5, 1), (1.5, 2), (2.5, 0), (-0.5, 0)] {
+                    let mut p = Point::new(0.35, 0.4, 0.3);
+                    p[axis] = along;
+                    assert_eq!(volumes.at(&seeker, p), volume);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn hooks_over_each_other_lie_in_what_is_around_both() {
+        let mut surface = Surface::default();
+        let around =
+            (-3..8).flat_map(|x| (-1..2).flat_map(move |y| (-2..8).map(move |z| [x, y, z])));
+        add_cells(&mut surface, &around.collect::<Vec<_>>());
+        // Each begins below a part of the other.
+        let first = [[0, 0], [-1, 0], [-1, 1], [-1, 2], [-1, 3], [-1, 4], [0, 4], [1, 4], [2, 4]];
+        let second = [[2, 2], [1, 2], [0, 2]];
+        for hook in [&first[..], &second] {
+            let cells: Vec<[i32; 3]> = hook.iter().map(|[x, z]| [*x, 0, *z]).collect();
+            add_cells(&mut surface, &cells);
+        }
+        let seeker = Seeker::new(&surface);
+        let volumes = EnclosedVolumes::new(&seeker);
+        assert_eq!(volumes.n_volumes, 4);
+        for ([x, z], volume) in [([0, 0], 2), ([0, 2], 3), ([0, 4], 2), ([0, 3], 1), ([3, 3], 1)] {
+            let p = Point::new(f64::from(x), 0.0, f64::from(z)) + Point::new(0.4, 0.5, 0.3);
+            assert_eq!(volumes.at(&seeker, p), volume);
+        }
+    }
+
+    /// Adds the boundary of some unit cells, apart from all triangles there are.
+    fn add_cells(surface: &mut Surface, cells: &[[i32; 3]]) {
+        let known = surface.points.len();
+        for cell in cells {
+            for axis in [2, 0, 1] {
+                for up in [false, true] {
+                    let mut beside = *cell;
+                    beside[axis] += if up { 1 } else { -1 };
+                    if cells.contains(&beside) {
+                        continue;
+                    }
+                    let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| {
+                        let mut at = cell.map(f64::from);
+                        at[axis] += f64::from(u8::from(up));
+                        at[(axis + 1) % 3] += f64::from(a);
+                        at[(axis + 2) % 3] += f64::from(b);
+                        let p = Point::from_array(at);
+                        let place = surface.points[known..].iter().position(|&q| q == p);
+                        let place = place.unwrap_or_else(|| {
+                            surface.points.push(p);
+                            surface.points.len() - 1 - known
+                        });
+                        (known + place) as u32
+                    });
+                    let [a, b, c, d] = corners;
+                    let (b, d) = if up { (b, d) } else { (d, b) };
+                    surface.triangles.extend([[a, b, c], [a, c, d]]);
+                    surface.labels.extend([0, 0]);
+                }
             }
         }
     }

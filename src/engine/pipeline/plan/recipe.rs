@@ -5,7 +5,7 @@ use tetdb_store::store::{Catalog, Step, StoreError};
 
 /// Version of the recipe. It rises with every change that alters the digest of any mesh, or its ids. A store of one version cannot be
 /// continued by another.
-pub const RECIPE: u32 = 26;
+pub const RECIPE: u32 = 27;
 
 /// Records this version in `step`, together with the job.
 pub fn record_recipe(step: &mut Step) {
