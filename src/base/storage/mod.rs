@@ -64,5 +64,5 @@ pub use shelf::{Shelf, Shelved};
 pub use sort::{Sorted, Sorter};
 pub use sort_record::sort_record;
 pub use sort_record::{KeyedId, Payload, SortBytes, SortField, SortRecord, total_order};
-pub use spill_vec::{FrozenSpillVec, ScratchSpace, SpillVec, SpillVecBuilder};
+pub use spill_vec::{FrozenSpillVec, ScratchSpace, SpillVec, SpillVecBuilder, SpillVecReader};
 pub use step_clock::{SharedSeconds, StepClock};

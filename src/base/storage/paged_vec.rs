@@ -141,6 +141,23 @@ impl<T: Pod> PagedVec<T> {
         &mut self.frames[frame * Self::PER + i % Self::PER]
     }
 
+    /// Copies a page to `out`, from its frame if it has one.
+    pub fn copy_page(&self, page: usize, out: &mut Vec<T>) {
+        if out.is_empty() {
+            out.resize(Self::PER, self.initial);
+        }
+        let frame = (self.table[page] & ABSENT) as usize;
+        if frame != ABSENT as usize {
+            out.copy_from_slice(&self.frames[frame * Self::PER..(frame + 1) * Self::PER]);
+            return;
+        }
+        check_cancelled();
+        match self.table[page] & STORED {
+            0 => out.fill(self.initial),
+            _ => self.file.read(self.offset(page), bytemuck::cast_slice_mut(out)).or_raise(),
+        }
+    }
+
     #[inline]
     fn frame(&mut self, page: usize) -> usize {
         let frame = self.table[page] & ABSENT;

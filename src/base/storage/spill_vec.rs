@@ -174,12 +174,17 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
-    /// All elements, if they are in memory.
-    pub fn as_mut_slice(&mut self) -> Option<&mut [T]> {
-        match &mut self.place {
-            Residence::Memory(all) => Some(all),
-            Residence::Disk(_) => None,
-        }
+    /// Reads elements beside other readers.
+    pub fn reader(&self) -> SpillVecReader<'_, T> {
+        let place = match &self.place {
+            Residence::Memory(all) => ReaderPlace::Memory(all),
+            Residence::Disk(paged) => {
+                let (least, most) = PAGES_OF_READER;
+                let n = (PAGES_READ / rayon::current_num_threads()).clamp(least, most);
+                ReaderPlace::Disk(paged, vec![(usize::MAX, Vec::new()); n])
+            }
+        };
+        SpillVecReader { place }
     }
 
     /// The array for reading by many threads.
@@ -188,6 +193,41 @@ impl<T: Pod> SpillVec<T> {
             Residence::Memory(all) => FrozenSpillVec::Memory(all),
             Residence::Disk(paged) => {
                 FrozenSpillVec::Disk(Arc::new(SharedPagedVec::new(*paged, self.lease)))
+            }
+        }
+    }
+}
+
+/// Pages all threads' readers of an array keep, and the least and most of one of them.
+const PAGES_READ: usize = 128;
+const PAGES_OF_READER: (usize, usize) = (4, 16);
+
+/// Reads elements of an array that does not change meanwhile. Memory: 64 to 256 KiB if the array is in a scratch file.
+pub struct SpillVecReader<'a, T> {
+    place: ReaderPlace<'a, T>,
+}
+
+enum ReaderPlace<'a, T> {
+    Memory(&'a [T]),
+    /// Copies of pages with their numbers, each at its number's remainder.
+    Disk(&'a PagedVec<T>, Vec<(usize, Vec<T>)>),
+}
+
+impl<T: Pod> SpillVecReader<'_, T> {
+    /// Element `i`. Unwinds when the scratch file fails.
+    #[inline(always)]
+    pub fn get(&mut self, i: usize) -> T {
+        match &mut self.place {
+            ReaderPlace::Memory(all) => all[i],
+            ReaderPlace::Disk(paged, pages) => {
+                let (page, slot) = (i / per_page::<T>(), i % per_page::<T>());
+                let place = page % pages.len();
+                let (known, copy) = &mut pages[place];
+                if *known != page {
+                    paged.copy_page(page, copy);
+                    *known = page;
+                }
+                copy[slot]
             }
         }
     }
@@ -348,6 +388,9 @@ mod tests {
                 let [a, b] = array.get(i);
                 array.set(i, [a.wrapping_mul(3), b + 1]);
             }
+            let known: Vec<[u32; 2]> = (0..n).map(|i| array.get(i)).collect();
+            let mut reader = array.reader();
+            assert!(places(n).chain(0..n).all(|i| reader.get(i) == known[i]));
             let mut builder = scratch.builder();
             for i in 0..n {
                 builder.push(array.get(i));
@@ -360,7 +403,11 @@ mod tests {
                     |i| fixed.get(i).map(u64::from).iter().sum(),
                 ));
             array.fill([1, 2]);
-            assert!((0..n).all(|i| array.get(i) == [1, 2]));
+            array.set(5, [3, 4]);
+            let mut reader = array.reader();
+            let filled = |i| if i == 5 { [3, 4] } else { [1, 2] };
+            assert!((0..n).all(|i| reader.get(i) == filled(i)));
+            assert!((0..n).all(|i| array.get(i) == filled(i)));
             found.push(sums);
         }
         assert!(found[0] == found[1]);

@@ -165,13 +165,11 @@ fn find_hanging(
         if some.is_empty() {
             break;
         }
-        let found_now = match of_leaf.as_slice() {
-            Some(all) => {
-                let of = |some: &[(usize, Leaf)]| hanging_of(tree, some, |i| all[i]);
-                parallel(|| some.par_chunks(LEAVES_AT_ONCE).map(of).collect())
-            }
-            None => vec![hanging_of(tree, &some, |i| of_leaf.get(i))],
+        let of = |some: &[(usize, Leaf)]| {
+            let mut ids = of_leaf.reader();
+            hanging_of(tree, some, |i| ids.get(i))
         };
+        let found_now: Vec<_> = parallel(|| some.par_chunks(LEAVES_AT_ONCE).map(of).collect());
         for hanging in found_now.into_iter().flatten() {
             found.push(hanging)?;
         }

@@ -1,9 +1,11 @@
 //! Sizes that grow no steeper than the gradation allows.
 
+use std::ops::Range;
+
 use fixedbitset::FixedBitSet;
 use rayon::prelude::*;
 
-use super::corners::{Hanging, TreeCorners};
+use super::corners::TreeCorners;
 use super::parts::{CornerParts, OfLeaves, PartLeaves, PartWork};
 use tetdb_base::storage::{SpillVec, parallel};
 
@@ -13,31 +15,52 @@ const GRADE_ROUNDS: u32 = 4;
 /// A hanging corner's mean may exceed its graded value by this factor. The slope bound is stated with more slack; at
 /// 1.001 every round finds something left to lower.
 const EXCESS_MAX: f32 = 1.01;
-/// Hanging corners whose means are computed before they are set.
+/// Hanging corners whose means are computed before they are set, and those of a task.
 const MEANS_AT_ONCE: usize = 1 << 18;
+const MEANS_OF_TASK: usize = 1 << 13;
 
 /// Gives hanging corners their means, where these are known.
-pub(super) fn close_finite(corners: &mut TreeCorners, h: &mut SpillVec<f32>) {
-    let hanging = &mut corners.hanging;
-    if let (Some(all), Some(h)) = (hanging.as_slice(), h.as_mut_slice()) {
+pub(super) fn close_finite(corners: &TreeCorners, h: &mut SpillVec<f32>) {
+    let n = corners.hanging.len();
+    let mut hanging = corners.hanging.reader();
+    let mut first = 0;
+    while first < n {
         // No corner hangs on one of its own level.
-        for some in all.chunk_by(|a, b| a.level == b.level).flat_map(|l| l.chunks(MEANS_AT_ONCE)) {
-            let mean = |hanging: &Hanging| mean_on(hanging.on, |on| h[on]);
-            let means: Vec<f32> =
-                parallel(|| some.par_iter().with_min_len(4096).map(mean).collect());
-            for (hanging, mean) in some.iter().zip(means).filter(|(_, mean)| mean.is_finite()) {
-                h[hanging.corner as usize] = mean;
-            }
+        let level = hanging.get(first).level;
+        let end = partition_point(first..n, |k| hanging.get(k).level == level);
+        let end = end.min(first + MEANS_AT_ONCE);
+        let means: Vec<_> = parallel(|| {
+            let starts = (first..end).into_par_iter().step_by(MEANS_OF_TASK);
+            starts.map(|k| means(corners, k..end.min(k + MEANS_OF_TASK), h)).collect()
+        });
+        for (corner, mean) in means.into_iter().flatten() {
+            h.set(corner, mean);
         }
-        return;
+        first = end;
     }
-    for k in 0..hanging.len() {
+}
+
+/// Some hanging corners and their means, of those that are known.
+fn means(corners: &TreeCorners, range: Range<usize>, h: &SpillVec<f32>) -> Vec<(usize, f32)> {
+    let (mut hanging, mut h) = (corners.hanging.reader(), h.reader());
+    let of = |k| {
         let hanging = hanging.get(k);
-        let mean = mean_on(hanging.on, |on| h.get(on));
-        if mean.is_finite() {
-            h.set(hanging.corner as usize, mean);
+        (hanging.corner as usize, mean_on(hanging.on, |on| h.get(on)))
+    };
+    range.map(of).filter(|(_, mean)| mean.is_finite()).collect()
+}
+
+/// The first place of a range where `is_before` does not hold, or its end.
+fn partition_point(range: Range<usize>, mut is_before: impl FnMut(usize) -> bool) -> usize {
+    let (mut low, mut high) = (range.start, range.end);
+    while low < high {
+        let middle = low.midpoint(high);
+        match is_before(middle) {
+            true => low = middle + 1,
+            false => high = middle,
         }
     }
+    low
 }
 
 fn mean_on(on: [u32; 4], mut h: impl FnMut(usize) -> f32) -> f32 {
@@ -50,11 +73,11 @@ fn mean_on(on: [u32; 4], mut h: impl FnMut(usize) -> f32) -> f32 {
 
 /// The slope bound between corners of the same leaf.
 pub(super) struct Grading<'a> {
-    pub parts: &'a mut CornerParts,
+    pub parts: &'a CornerParts,
     pub corners: &'a mut TreeCorners,
     pub beta: f64,
     /// By leaf, how many times `beta` its slope may be; once where it is not given.
-    pub slope_factor: Option<&'a mut SpillVec<f32>>,
+    pub slope_factor: Option<&'a SpillVec<f32>>,
 }
 
 impl Grading<'_> {
@@ -62,8 +85,7 @@ impl Grading<'_> {
     ///
     /// The result is the largest such function below the given values, in any order.
     pub fn grade(&mut self, h: &mut SpillVec<f32>) {
-        let slope_factor = self.slope_factor.as_deref_mut();
-        let of = OfLeaves { ids: &mut self.corners.of_leaf, slope_factor };
+        let of = OfLeaves { ids: &self.corners.of_leaf, slope_factor: self.slope_factor };
         self.parts.settle(of, h, &Slope { beta: self.beta });
     }
 
@@ -103,7 +125,7 @@ impl PartWork for Slope {
     /// Sweeps go forward and backward by turns, because a lowered value travels along with the sweep of its direction.
     fn run(
         &self,
-        leaves: &PartLeaves,
+        leaves: &mut PartLeaves,
         first: usize,
         h: &mut impl FnMut(usize) -> f32,
         own: &mut [f32],
@@ -117,7 +139,7 @@ impl PartWork for Slope {
             let mut is_done = true;
             for k in 0..n {
                 let k = if sweep.is_multiple_of(2) { k } else { n - 1 - k };
-                let ids = leaves.ids(k);
+                let (leaf, ids) = leaves.at(k);
                 let places = ids.map(|id| (id as usize).wrapping_sub(first));
                 let is_due = match sweep {
                     0 => !leaves.is_again || places.iter().any(|&place| place >= own.len()),
@@ -131,7 +153,7 @@ impl PartWork for Slope {
                     *value = own.get(place).copied().unwrap_or_else(|| h(id as usize));
                 }
                 let mut lowered = before;
-                let step = self.beta * leaves.side(k) * leaves.slope_factor(k);
+                let step = self.beta * leaf.side() * leaves.slope_factor(leaf);
                 let steps = [0.0, step, step * 2f64.sqrt(), step * 3f64.sqrt()];
                 relax(&mut lowered, &steps);
                 for ((place, value), before) in places.into_iter().zip(lowered).zip(before) {
@@ -228,7 +250,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         for scratch in [ScratchSpace::boundless(), ScratchSpace::new(1 << 16, dir.path())] {
             let mut corners = TreeCorners::new(&tree, &scratch);
-            let mut parts = CornerParts::new(&tree, &mut corners, &scratch, |_| true);
+            let parts = CornerParts::new(&tree, &mut corners, &scratch, |_| true);
             let wild = |i: usize| ((i * 7919 % 1009) as f32 / 100.0).exp() - 2.0;
             let mut h = scratch.vec(corners.n_corners, 0.0f32);
             (0..h.len()).for_each(|i| h.set(i, wild(i)));
@@ -249,7 +271,7 @@ mod tests {
                 }
             }
             let corners = &mut corners;
-            Grading { parts: &mut parts, corners, beta, slope_factor: None }.grade(&mut h);
+            Grading { parts: &parts, corners, beta, slope_factor: None }.grade(&mut h);
             assert!(expected.len() > 5_000, "{}", expected.len());
             assert!((0..h.len()).all(|i| h.get(i) == expected[i]));
         }

@@ -1,6 +1,7 @@
 //! Sizes at the octree's corners: gathered from the surface, filled in between, graded.
 
 use fixedbitset::FixedBitSet;
+use rayon::prelude::*;
 
 use super::SizingError;
 use super::constraints::SizeConstraints;
@@ -11,7 +12,9 @@ use super::parts::{CornerParts, OfLeaves, PartLeaves, PartWork};
 use super::seeds::Seeds;
 use super::tree::{LATTICE, Leaf, Tree};
 use tetdb_base::geom::Point;
-use tetdb_base::storage::{OrRaise, ScratchSpace, SpillVec, check_cancelled, sort_record};
+use tetdb_base::storage::{
+    OrRaise, ScratchSpace, SortRecord, SpillVec, check_cancelled, parallel, sort_record,
+};
 
 /// Rounds of averaging that smooth filled values. The graph is shallow (cells grow with the distance to the surface).
 /// After these rounds, the number of tetrahedra expected of a scanned skull is within 0.4 % of the limit.
@@ -21,6 +24,8 @@ const FILL_ROUNDS: u32 = 18;
 const SLOWEST: f32 = 0.98;
 /// Largest factor between a value and the mean of its neighbors.
 const REACH: f32 = 2.0;
+/// Seeds whose leaves are found together.
+const SEEDS_AT_ONCE: usize = 1 << 16;
 /// For each corner of a cell, the three corners at the other ends of its edges.
 const ALONG_EDGES: [[u8; 3]; 8] =
     [[1, 2, 4], [0, 3, 5], [0, 3, 6], [1, 2, 7], [0, 5, 6], [1, 4, 7], [2, 4, 7], [3, 5, 6]];
@@ -93,9 +98,18 @@ impl CornerSizes<'_> {
     pub fn gather(&mut self, value: impl Fn(&Seeds, u32) -> f64) -> (SpillVec<f32>, SpillVec<f64>) {
         let (tree, seeds, n) = (self.tree, self.seeds, self.corners.n_corners);
         let mut by_leaf = self.scratch.sorter::<LeafSeed>();
-        for v in seeds.all() {
-            let (leaf, _) = tree.leaf_at(lattice_cell(seeds.at(v)));
-            by_leaf.push(LeafSeed { leaf, seed: v }).or_raise();
+        let mut all = seeds.all();
+        loop {
+            let some: Vec<u32> = all.by_ref().take(SEEDS_AT_ONCE).collect();
+            if some.is_empty() {
+                break;
+            }
+            let in_leaf = |&seed: &u32| {
+                let (leaf, _) = tree.leaf_at(lattice_cell(seeds.at(seed)));
+                LeafSeed { leaf, seed }.to_bytes()
+            };
+            let found: Vec<_> = parallel(|| some.par_iter().map(in_leaf).collect());
+            by_leaf.extend(&found).or_raise();
         }
         let by_leaf = by_leaf.finish().or_raise();
         let mut sums = self.scratch.vec(n, [0.0f64; 2]);
@@ -154,7 +168,7 @@ impl CornerSizes<'_> {
             }
         }
         let is_due = |ids: &[u32; 8]| ids.iter().any(|&c| is_open.contains(c as usize));
-        let mut open = CornerParts::new(self.tree, self.corners, self.scratch, is_due);
+        let open = CornerParts::new(self.tree, self.corners, self.scratch, is_due);
         if open.is_empty() {
             return h;
         }
@@ -168,9 +182,8 @@ impl CornerSizes<'_> {
                 1 => 1.0 / (1.0 - 0.5 * SLOWEST * SLOWEST),
                 _ => 1.0 / (1.0 - 0.25 * SLOWEST * SLOWEST * over),
             };
-            let of = OfLeaves { ids: &mut self.corners.of_leaf, slope_factor: None };
-            let reached =
-                open.change(of, &mut h, &mut before, &Average { is_open: &is_open, over });
+            let of = OfLeaves { ids: &self.corners.of_leaf, slope_factor: None };
+            let reached = open.change(of, &h, &mut before, &Average { is_open: &is_open, over });
             std::mem::swap(&mut h, &mut before);
             close_finite(self.corners, &mut h);
             smooth += u32::from(!reached);
@@ -184,7 +197,7 @@ impl CornerSizes<'_> {
             parts: self.parts.get_or_insert_with(all),
             corners: self.corners,
             beta: self.beta,
-            slope_factor: self.slope_factor.as_mut(),
+            slope_factor: self.slope_factor.as_ref(),
         }
     }
 
@@ -243,16 +256,16 @@ impl PartWork for Average<'_> {
     /// Returns whether a corner got its first value.
     fn run(
         &self,
-        leaves: &PartLeaves,
+        leaves: &mut PartLeaves,
         first: usize,
         h: &mut impl FnMut(usize) -> f32,
         own: &mut [f32],
     ) -> bool {
         let mut sums = vec![[0.0f32; 2]; own.len()];
         for k in 0..leaves.len() {
-            let ids = leaves.ids(k);
+            let (leaf, ids) = leaves.at(k);
             // A cell's edge conducts as its width.
-            let weight = leaves.side(k) as f32;
+            let weight = leaf.side() as f32;
             let mut values = [0.0; 8];
             for (value, &id) in values.iter_mut().zip(&ids) {
                 *value = weight * h(id as usize);
