@@ -141,7 +141,7 @@ impl<T: Pod> PagedVec<T> {
         &mut self.frames[frame * Self::PER + i % Self::PER]
     }
 
-    /// Copies a page to `out`, from its frame if it has one.
+    /// Copies a page to `out`, from its frame if it has one. `out` is empty or as long as a page. Unwinds when the scratch file fails.
     pub fn copy_page(&self, page: usize, out: &mut Vec<T>) {
         if out.is_empty() {
             out.resize(Self::PER, self.initial);

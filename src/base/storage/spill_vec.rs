@@ -174,7 +174,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
-    /// Reads elements beside other readers.
+    /// Reads elements beside other readers; [`FrozenSpillVec`] does so where the array never changes again.
     pub fn reader(&self) -> SpillVecReader<'_, T> {
         let place = match &self.place {
             Residence::Memory(all) => ReaderPlace::Memory(all),
